@@ -1,0 +1,73 @@
+"""Every error that evplace raises on purpose.
+
+EvplaceError
+├── SettingsError            a setting is unknown or has a value that cannot be used
+├── MissingExtraError        an optional dependency is needed: the text carries the pip line
+├── InputError               what was given cannot be used
+│   ├── RecordingError       an event recording
+│   │   └── DamagedRecordingError   the good part was delivered, then the data broke off
+│   ├── TrackError           a GPS log or positions
+│   ├── TraverseError        a traverse folder, or images and times that do not fit
+│   ├── PlaceMapError        a map: wrong checksum, made with other settings, not a map
+│   ├── ScoresError          score rows that a matcher cannot use
+│   └── EvaluationError      truth and answers that do not fit
+└── OutputError              an output exists, is being written by another process, or the disk is full
+
+The text of each says what is wrong, what was given, and what to do. Only the command line catches
+EvplaceError: it prints one line and exits with 2, or with 3 where a good part was used.
+"""
+
+from __future__ import annotations
+
+
+class EvplaceError(Exception):
+    """Base of all errors raised on purpose."""
+
+
+class SettingsError(EvplaceError):
+    """A setting is unknown or has a value that cannot be used."""
+
+
+class MissingExtraError(EvplaceError):
+    """An optional dependency is missing."""
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        super().__init__(
+            f"{purpose} needs the package '{package}', which is not installed: pip install 'evplace[{extra}]'"
+        )
+
+
+class InputError(EvplaceError):
+    """What was given cannot be used."""
+
+
+class RecordingError(InputError):
+    """An event recording cannot be read."""
+
+
+class DamagedRecordingError(RecordingError):
+    """A recording broke off: every complete packet before the fault was delivered."""
+
+
+class TrackError(InputError):
+    """A GPS log or a set of positions cannot be used."""
+
+
+class TraverseError(InputError):
+    """A traverse folder, or images and times, cannot be used."""
+
+
+class PlaceMapError(InputError):
+    """A map cannot be used."""
+
+
+class ScoresError(InputError):
+    """Score rows cannot be used by a matcher."""
+
+
+class EvaluationError(InputError):
+    """Truth and answers do not fit each other."""
+
+
+class OutputError(EvplaceError):
+    """An output cannot be written."""

@@ -1,0 +1,27 @@
+"""Families of interchangeable parts: a folder is a family, a file in it is one part, its name is its name.
+
+Adding a part touches its own file and its test, nothing else: the folder itself is the list.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from types import ModuleType
+
+from evplace.errors import SettingsError
+
+
+def names(family: str) -> list[str]:
+    """The parts of a family, for example `names("matchers")`: the public files of its folder, sorted."""
+    package = importlib.import_module(f"evplace.{family}")
+    found = (module.name for module in pkgutil.iter_modules(package.__path__))
+    return sorted(name for name in found if not name.startswith("_"))
+
+
+def load(family: str, name: str) -> ModuleType:
+    """The part `name` of a family; SettingsError, with the known names, where there is none."""
+    known = names(family)
+    if name not in known:
+        raise SettingsError(f"'{name}' is none of the {family}: known are {', '.join(known)}")
+    return importlib.import_module(f"evplace.{family}.{name}")

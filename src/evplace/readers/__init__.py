@@ -1,0 +1,1 @@
+"""Event recordings -> packets of checked events."""

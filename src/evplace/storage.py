@@ -1,0 +1,159 @@
+"""Outputs appear whole or not at all: a temporary name in the same folder, fsync, rename.
+
+While an output is being written it is locked; a second writer is refused at once. The lock is an
+operating-system file lock: it dies with its process, so a killed writer blocks nobody.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import json
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from evplace.errors import InputError, OutputError
+
+
+@contextlib.contextmanager
+def new_folder(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
+    """A temporary folder beside `path` that takes its name when the block ends well, else vanishes.
+
+    Raises OutputError where `path` exists (unless `overwrite`), another process is writing it, or the
+    disk is full.
+    """
+    target = Path(path)
+    partial = target.with_name(f".{target.name}.partial")
+    with _explained(target, partial), locked(target):
+        _refuse_existing(target, overwrite)
+        shutil.rmtree(partial, ignore_errors=True)
+        partial.mkdir()
+        try:
+            yield partial
+            for file in partial.rglob("*"):
+                _fsync(file)
+            _replace(target, partial)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def new_file(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
+    """A temporary file name beside `path`; what the block writes there takes its name when it ends well.
+
+    Raises OutputError as `new_folder` does.
+    """
+    target = Path(path)
+    partial = target.with_name(f".{target.stem}.partial{target.suffix}")
+    with _explained(target, partial), locked(target):
+        _refuse_existing(target, overwrite)
+        try:
+            yield partial
+            _fsync(partial)
+            _replace(target, partial)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def locked(target: Path) -> Iterator[None]:
+    """Hold the one writer's place for `target`; OutputError if another process holds it."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    lock = target.with_name(f".{target.name}.lock")
+    handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        if not _try_lock(handle):
+            raise OutputError(
+                f"{target} is being written by another process: wait for it, or write elsewhere"
+            )
+        yield
+        lock.unlink(missing_ok=True)
+    finally:
+        os.close(handle)
+
+
+def write_json(path: Path, value: object) -> None:
+    """`value` as indented JSON; NaN and infinity are refused, because JSON has none."""
+    path.write_text(json.dumps(value, indent=1, allow_nan=False) + "\n", "utf-8")
+
+
+def read_json(path: Path, what: str) -> dict[str, Any]:
+    """The JSON object in `path`; InputError, naming `what` it should be, where there is none."""
+    try:
+        value = json.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read {what}: {path}: {error.strerror}") from error
+    except ValueError as error:
+        raise InputError(f"{what} is damaged: {path} is not JSON ({error})") from error
+    if not isinstance(value, dict):
+        raise InputError(f"{what} is damaged: {path} holds no JSON object")
+    return value
+
+
+def sha256(path: Path) -> str:
+    """The checksum of a file's bytes, as hexadecimal text."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _refuse_existing(target: Path, overwrite: bool) -> None:
+    if target.exists() and not overwrite:
+        raise OutputError(f"{target} exists: choose another name, remove it, or add --overwrite")
+
+
+def _replace(target: Path, partial: Path) -> None:
+    """Give `partial` the name of `target`; what stood there goes only once the new one is in its place."""
+    old = target.with_name(f".{target.name}.old")
+    if target.exists():
+        target.rename(old)
+    partial.rename(target)
+    _fsync(target.parent)
+    if old.is_dir():
+        shutil.rmtree(old)
+    else:
+        old.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _explained(target: Path, partial: Path) -> Iterator[None]:
+    """Turn the system's errors of writing `target` into ours; others pass, for they are not about it."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise OutputError(f"the disk is full: {target} was not written") from error
+        names = str(error.filename or "")
+        if names.startswith((str(partial), str(target.parent))):
+            raise OutputError(f"cannot write {target}: {error.strerror or error}") from error
+        raise
+
+
+def _fsync(path: Path) -> None:
+    """Have the bytes on the disk before the name says that they are; folders only where the system can."""
+    if path.is_dir() and sys.platform == "win32":
+        return
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _try_lock(handle: int) -> bool:
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
