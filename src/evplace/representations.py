@@ -142,7 +142,8 @@ class Voxel:
             position = (events.t_us - events.t_us[0]) * (self._bins - 1) / span
             _share(grid, position, events.x, events.y, events.p)
         share = np.clip(grid / np.float32(self._saturation), -1, 1)
-        return (share * np.float32(0.5) + np.float32(0.5)).astype(np.float32)
+        share = share * np.float32(0.5) + np.float32(0.5)
+        return np.asarray(share, np.float32)
 
     def clear(self) -> None:
         """See Representation."""
