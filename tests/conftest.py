@@ -6,6 +6,10 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("evplace", deadline=None)  # the first call of a numba loop compiles it
+settings.load_profile("evplace")
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,9 @@ from evplace.errors import SettingsError
 Row = NDArray[np.floating[Any]]
 """(items,) scores of one query against every map item, larger is better."""
 
+Rows = NDArray[np.floating[Any]]
+"""(queries, items) score rows in the order of the queries."""
+
 
 class Answer(NamedTuple):
     """What a matcher says of one query."""
@@ -61,6 +64,12 @@ class Matcher(Protocol):
         """Take the next query's row; say what is known by now, causally, or None while nothing is.
 
         A matcher that looks ahead (SeqSLAM) answers for an earlier query: see `Answer.query`.
+        """
+
+    def extend(self, rows: Rows) -> None:
+        """Take the rows of many queries at once: the same as `step` on each, without a call for each.
+
+        Any cutting of the rows into blocks gives the same `path`.
         """
 
     def path(self) -> Path:
