@@ -41,7 +41,8 @@ def time_unit(name: str, sample: NDArray[Any], hints: Hints) -> tuple[str, list[
     if "_" in name and suffix in US_PER_UNIT:
         return suffix, []
     unit = "us" if np.issubdtype(sample.dtype, np.integer) else "s"
-    span_s = float(sample[-1] - sample[0]) * US_PER_UNIT[unit] / 1e6 if len(sample) else 0.0
+    finite = sample[np.isfinite(sample)].astype(np.float64)
+    span_s = (finite[-1] - finite[0]) * US_PER_UNIT[unit] / 1e6 if len(finite) else 0.0
     rate = len(sample) / span_s if span_s > 0 else 0.0
     low, high = (2e4, 1e9) if unit == "us" else (10.0, 1e9)
     if not low <= rate <= high:
@@ -63,7 +64,8 @@ def block(t: NDArray[Any], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any], un
 def _microseconds(t: NDArray[Any], unit: str) -> NDArray[np.int64]:
     if t.dtype.kind == "f":
         limit = 2.0**62
-        return np.rint(np.clip(t.astype(np.float64) * US_PER_UNIT[unit], -limit, limit)).astype(np.int64)
+        with np.errstate(over="ignore"):
+            return np.rint(np.clip(t.astype(np.float64) * US_PER_UNIT[unit], -limit, limit)).astype(np.int64)
     if unit == "ns":
         return t.astype(np.int64) // 1000
     whole = t.astype(np.int64)

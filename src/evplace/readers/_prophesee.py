@@ -63,6 +63,12 @@ def stated_size(fields: dict[str, str]) -> Size | None:
     return width, height
 
 
+def start_us(fields: dict[str, str]) -> int:
+    """The time in microseconds that all others count from, where the header states one (faery writes it)."""
+    stated = fields.get("t0", "0")
+    return int(stated) if re.fullmatch(r"\d{1,18}", stated) else 0
+
+
 def words(path: Path, offset: int, kind: DTypeLike, count: int) -> Iterator[NDArray[Any]]:
     """The data from byte `offset` on as words of type `kind`, at most `count` at a time.
 

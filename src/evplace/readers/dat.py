@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from evplace.errors import RecordingError
 from evplace.readers._clock import clock, unwrap_32
-from evplace.readers._prophesee import evt_version, head_of, header, stated_size, words
+from evplace.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
 from evplace.readers._source import Block, Hints, Source
 
 ABOUT = "Prophesee DAT file"
@@ -45,16 +45,20 @@ def read(path: Path, hints: Hints) -> Source:
     if version not in ("", "1", "2"):
         raise RecordingError(f"{path} is a DAT file of version '{version}': known are 1 and 2")
     notes = [] if version else ["the DAT header states no version: 2 is taken"]
-    return Source(stated_size(fields), partial(_blocks, path, start + 2, version == "1"), notes)
+    return Source(
+        stated_size(fields), partial(_blocks, path, start + 2, version == "1", start_us(fields)), notes
+    )
 
 
-def _blocks(path: Path, start: int, first_version: bool) -> Iterator[Block]:
+def _blocks(path: Path, start: int, first_version: bool, shift_us: int) -> Iterator[Block]:
     state = None
     for run in words(path, start, RECORD, EVENTS):
         if state is None:
             state = clock(int(run["t"][0]))
         t_us = unwrap_32(state, np.ascontiguousarray(run["t"]))
-        yield Block(t_us, *(_version_1 if first_version else _version_2)(run["data"]))
+        yield Block(
+            t_us + shift_us if shift_us else t_us, *(_version_1 if first_version else _version_2)(run["data"])
+        )
 
 
 def _version_1(data: NDArray[np.uint32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from evplace.readers._clock import clock, unwrap
-from evplace.readers._prophesee import evt_version, head_of, header, stated_size, words
+from evplace.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
 from evplace.readers._source import Block, Hints, Source
 
 ABOUT = "Prophesee raw file, EVT 2.0"
@@ -30,10 +30,10 @@ def matches(path: Path, head: bytes) -> bool:
 def read(path: Path, hints: Hints) -> Source:
     """The header; RecordingError where it states an impossible size."""
     fields, start = header(head_of(path))
-    return Source(stated_size(fields), partial(_blocks, path, start))
+    return Source(stated_size(fields), partial(_blocks, path, start, start_us(fields)))
 
 
-def _blocks(path: Path, start: int) -> Iterator[Block]:
+def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:
     state, clock_state = np.zeros(3, np.int64), clock()
     for run in words(path, start, "<u4", WORDS):
         t_us, x, y = (
@@ -43,7 +43,7 @@ def _blocks(path: Path, start: int) -> Iterator[Block]:
         )
         p = np.empty(len(run), np.bool_)
         state[2] = 0
-        count = _decode(run, state, clock_state, t_us, x, y, p)
+        count = _decode(run, state, clock_state, shift_us, t_us, x, y, p)
         yield Block(t_us[:count], x[:count], y[:count], p[:count], int(state[2]))
 
 
@@ -52,6 +52,7 @@ def _decode(
     run: NDArray[np.uint32],
     state: NDArray[np.int64],
     clock_state: NDArray[np.int64],
+    shift_us: int,
     t_us: NDArray[np.int64],
     x: NDArray[np.uint16],
     y: NDArray[np.uint16],
@@ -63,7 +64,7 @@ def _decode(
         kind = word >> 28
         if kind <= 1:
             if timed:
-                t_us[count] = high << 6 | np.int64(word >> 22 & 0x3F)
+                t_us[count] = shift_us + (high << 6 | np.int64(word >> 22 & 0x3F))
                 x[count], y[count], p[count] = word >> 11 & 0x7FF, word & 0x7FF, kind == 1
                 count += 1
             else:

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from evplace.readers._clock import clock, unwrap
-from evplace.readers._prophesee import evt_version, head_of, header, stated_size, words
+from evplace.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
 from evplace.readers._source import Block, Hints, Source
 
 ABOUT = "Prophesee raw file, EVT 3.0"
@@ -30,11 +30,11 @@ def matches(path: Path, head: bytes) -> bool:
 def read(path: Path, hints: Hints) -> Source:
     """The header; RecordingError where it states an impossible size."""
     fields, start = header(head_of(path))
-    return Source(stated_size(fields), partial(_blocks, path, start))
+    return Source(stated_size(fields), partial(_blocks, path, start, start_us(fields)))
 
 
-def _blocks(path: Path, start: int) -> Iterator[Block]:
-    decoder = Decoder()
+def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:
+    decoder = Decoder(shift_us)
     for part in words(path, start, "<u2", WORDS):
         yield decoder.decode(part)
 
@@ -42,7 +42,8 @@ def _blocks(path: Path, start: int) -> Iterator[Block]:
 class Decoder:
     """Remembers row, column and time from one run of words to the next."""
 
-    def __init__(self) -> None:
+    def __init__(self, shift_us: int = 0) -> None:
+        self._shift_us = shift_us
         # time (us), row, base column, polarity, time high seen, unwrapped time high, untimed events
         self._state = np.zeros(6, np.int64)
         self._clock = clock()
@@ -53,7 +54,7 @@ class Decoder:
         t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
         p = np.empty(room, np.bool_)
         self._state[5] = 0
-        count = _decode(run, self._state, self._clock, t_us, x, y, p)
+        count = _decode(run, self._state, self._clock, self._shift_us, t_us, x, y, p)
         return Block(t_us[:count], x[:count], y[:count], p[:count], int(self._state[5]))
 
 
@@ -78,6 +79,7 @@ def _decode(
     run: NDArray[np.uint16],
     state: NDArray[np.int64],
     clock_state: NDArray[np.int64],
+    shift_us: int,
     t_us: NDArray[np.int64],
     x: NDArray[np.uint16],
     y: NDArray[np.uint16],
@@ -89,7 +91,12 @@ def _decode(
         kind, value = word >> 12, np.int64(word & 0xFFF)
         if kind == 0x2:  # one event
             if timed:
-                t_us[count], x[count], y[count], p[count] = time, value & 0x7FF, row, value & 0x800 != 0
+                t_us[count], x[count], y[count], p[count] = (
+                    shift_us + time,
+                    value & 0x7FF,
+                    row,
+                    value & 0x800 != 0,
+                )
                 count += 1
             else:
                 untimed += 1
@@ -102,7 +109,7 @@ def _decode(
             for bit in range(width):
                 if value >> bit & 1:
                     if timed:
-                        t_us[count], x[count], y[count], p[count] = time, base + bit, row, polarity
+                        t_us[count], x[count], y[count], p[count] = shift_us + time, base + bit, row, polarity
                         count += 1
                     else:
                         untimed += 1

@@ -6,10 +6,11 @@ arrays `width` and `height` state the sensor. Pickled arrays are refused.
 
 from __future__ import annotations
 
+import struct
 import zipfile
 import zlib
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Generator, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from pathlib import Path
 from typing import IO, Any
@@ -25,9 +26,22 @@ from evplace.readers._source import Block, Hints, Source
 ABOUT = "numpy archive (.npz) with arrays t, x, y, p"
 EVENTS = 1 << 19
 """Events read at a time."""
-FAULTS = (zipfile.BadZipFile, zlib.error, OSError, EOFError, NotImplementedError, RuntimeError, ValueError)
+FAULTS = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    OSError,
+    EOFError,
+    LookupError,
+    RuntimeError,
+    ValueError,
+)
 """What reading a damaged archive raises."""
 
+_READ_HEADER = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+_Member = tuple[IO[bytes], np.dtype[Any], tuple[int, ...]]
+_Dtypes = dict[str, tuple[np.dtype[Any], tuple[int, ...]]]
+"""Member -> its type and shape."""
 _Layout = dict[str, tuple[str, str | None]]
 """Field -> the member that holds it and, where that has fields, the name of the field."""
 
@@ -41,10 +55,11 @@ def read(path: Path, hints: Hints) -> Source:
     """The layout, sensor and unit of time; RecordingError where the four arrays are missing or do not fit."""
     try:
         with zipfile.ZipFile(path) as archive:
-            dtypes = {name: _opened(archive, name)[1:] for name in _members(archive)}
+            dtypes = {name: _dtype(archive, name) for name in _members(archive)}
             layout = _layout(path, dtypes)
             size = _size(archive, dtypes)
-        sample = next(_columns_of(path, layout))["t"]
+        with closing(_columns_of(path, layout)) as slices:
+            sample = next(slices)["t"]
     except StopIteration:
         sample = np.empty(0, np.int64)
     except FAULTS as error:
@@ -58,51 +73,72 @@ def _members(archive: zipfile.ZipFile) -> list[str]:
     return [name.removesuffix(".npy") for name in archive.namelist() if name.endswith(".npy")]
 
 
-def _opened(archive: zipfile.ZipFile, name: str) -> tuple[IO[bytes], np.dtype[Any], tuple[int, ...]]:
+@contextmanager
+def _opened(archive: zipfile.ZipFile, name: str) -> Iterator[_Member]:
     """A member behind its header, its type and its shape; ValueError where it is none of plain numbers."""
-    file = archive.open(f"{name}.npy")
-    version = np.lib.format.read_magic(file)
-    read_header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-    if version not in read_header:
-        raise ValueError(f"the array '{name}' has the unknown format version {version}")
-    shape, _, dtype = read_header[version](file)
-    claimed = dtype.itemsize * int(np.prod(shape, dtype=object))
-    if dtype.hasobject or claimed > archive.getinfo(f"{name}.npy").file_size:
-        raise ValueError(f"the array '{name}' holds Python objects or claims more than is there")
-    return file, dtype, shape
+    with archive.open(f"{name}.npy") as file:
+        try:
+            version = np.lib.format.read_magic(file)
+            shape, _, dtype = _READ_HEADER[version](file)
+        except Exception as error:  # the header is Python text: numpy lets through what its parser raises
+            raise ValueError(f"the array '{name}' has a damaged header") from error
+        claimed = dtype.itemsize * int(np.prod(shape, dtype=object))
+        if dtype.hasobject or claimed > archive.getinfo(f"{name}.npy").file_size:
+            raise ValueError(f"the array '{name}' holds Python objects or claims more than is there")
+        yield file, dtype, shape
 
 
-def _layout(path: Path, dtypes: dict[str, tuple[np.dtype[Any], tuple[int, ...]]]) -> _Layout:
-    """Where each field is; RecordingError where one is missing or the lengths differ."""
+def _dtype(archive: zipfile.ZipFile, name: str) -> tuple[np.dtype[Any], tuple[int, ...]]:
+    with _opened(archive, name) as (_, dtype, shape):
+        return dtype, shape
+
+
+def _layout(path: Path, dtypes: _Dtypes) -> _Layout:
+    """Where each field is; RecordingError where one is missing, holds no numbers, or the lengths differ."""
+    layout = _named(dtypes)
+    if layout is None:
+        held = ", ".join(dtypes) or "none"
+        raise RecordingError(f"{path}: t, x, y and p are needed; the arrays in it are: {held}")
+    kinds = {
+        (dtypes[member][0] if name is None else dtypes[member][0][name]).kind
+        for member, name in layout.values()
+    }
+    shapes = {dtypes[member][1] for member, _ in layout.values()}
+    if not kinds <= set("biuf") or len(shapes) != 1 or len(next(iter(shapes))) != 1:
+        raise RecordingError(
+            f"{path}: t, x, y and p must be rows of numbers of one length, not {sorted(shapes)}"
+        )
+    return layout
+
+
+def _named(dtypes: _Dtypes) -> _Layout | None:
     for member, (dtype, _) in dtypes.items():
         fields = _columns.named(list(dtype.names or ()))
         if fields is not None:
             return {field: (member, name) for field, name in fields.items()}
     members = _columns.named(list(dtypes))
-    if members is None:
-        raise RecordingError(
-            f"{path} holds the arrays {', '.join(dtypes) or '(none)'}: t, x, y and p are needed"
-        )
-    shapes = {dtypes[member][1] for member in members.values()}
-    if len(shapes) != 1 or len(next(iter(shapes))) != 1:
-        raise RecordingError(
-            f"{path}: its arrays have the shapes {sorted(shapes)}: they must be rows of one length"
-        )
-    return {field: (member, None) for field, member in members.items()}
+    return None if members is None else {field: (member, None) for field, member in members.items()}
 
 
-def _size(archive: zipfile.ZipFile, dtypes: dict[str, tuple[np.dtype[Any], tuple[int, ...]]]) -> Size | None:
-    if not {"width", "height"} <= dtypes.keys():
-        return None
-    width, height = (int(np.load(archive.open(f"{n}.npy"), allow_pickle=False)) for n in ("width", "height"))
-    return (width, height) if 0 < width <= 1 << 16 and 0 < height <= 1 << 16 else None
+def _size(archive: zipfile.ZipFile, dtypes: _Dtypes) -> Size | None:
+    size = []
+    for name in ("width", "height"):
+        dtype, shape = dtypes.get(name, (np.dtype(np.float64), ()))
+        if dtype.kind not in "iu" or shape != ():
+            return None
+        with _opened(archive, name) as (file, _, _):
+            size.append(int(_slice(file, dtype, 1)[0]))
+    return (size[0], size[1]) if min(size) > 0 and max(size) <= 1 << 16 else None
 
 
-def _columns_of(path: Path, layout: _Layout) -> Iterator[dict[str, NDArray[Any]]]:
+def _columns_of(path: Path, layout: _Layout) -> Generator[dict[str, NDArray[Any]], None, None]:
     """Slices of the four fields, read from the members side by side."""
     with ExitStack() as stack:
         archive = stack.enter_context(zipfile.ZipFile(path))
-        members = {name: _opened(archive, name) for name in {member for member, _ in layout.values()}}
+        members = {
+            name: stack.enter_context(_opened(archive, name))
+            for name in {name for name, _ in layout.values()}
+        }
         left = min(shape[0] if shape else 0 for _, _, shape in members.values())
         while left > 0:
             count = min(left, EVENTS)
