@@ -11,8 +11,8 @@ SRC = Path(__file__).parents[1] / "src" / "evplace"
 
 ROOMS = (
     "errors plugs storage settings events readers cleaning windows images tracks places truth traverse "
-    "datasets simulators city placemap network train distances scorers matchers localizer "
-    "evaluation report cli"
+    "datasets simulators city placemap network train distances seqslam_images scorers matchers sweeps "
+    "localizer evaluation report cli"
 ).split()
 """In the order of the data: a room imports only rooms before it, or files of its own."""
 
