@@ -68,6 +68,25 @@ def npz(folder: Path, events: Events) -> Path:
     return path
 
 
+def hdf5(folder: Path, events: Events) -> Path:
+    """The layout of DSEC, in chunks."""
+    h5py: Any = pytest.importorskip("h5py")
+    path = folder / "made.h5"
+    with h5py.File(path, "w") as file:
+        file["t_offset"] = 0
+        file["ms_to_idx"] = np.searchsorted(events.t_us, np.arange(0, 100_000, 1000))
+        group = file.create_group("events")
+        group.attrs["width"], group.attrs["height"] = events.size
+        for name, rows in (
+            ("t", events.t_us),
+            ("x", events.x),
+            ("y", events.y),
+            ("p", events.p.astype("u1")),
+        ):
+            group.create_dataset(name, data=rows, chunks=(min(1024, len(rows)),), compression="gzip")
+    return path
+
+
 def evt3_words(events: Events) -> np.ndarray:
     """Events one by one, each with its row and time."""
     words = np.empty((len(events), 4), np.uint16)
@@ -159,6 +178,7 @@ MAKERS: dict[str, Callable[[Path, Events], Path]] = {
     "evt2": _by_faery("made.raw", version="evt2"),
     "evt21": evt21,
     "evt3": _by_faery("made.raw", version="evt3"),
+    "hdf5": hdf5,
     "npz": npz,
     "ros1": ros1,
     "ros2_db3": ros2_db3,

@@ -13,8 +13,8 @@ from evplace.readers._source import Block, Hints
 US_PER_UNIT = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
 NAMES = {
     "t": ("t", "ts", "time", "times", "timestamp", "timestamps", "t_s", "t_ms", "t_us", "t_ns"),
-    "x": ("x", "xs"),
-    "y": ("y", "ys"),
+    "x": ("x", "xs", "x_coordinates"),
+    "y": ("y", "ys", "y_coordinates"),
     "p": ("p", "ps", "pol", "polarity", "polarities", "on"),
 }
 """Field -> the names under which files hold it."""

@@ -164,4 +164,4 @@ def _heading(t_us: NDArray[np.int64], easting: Floats, northing: Floats, given: 
     span_us = t_us[after] - t_us[before]
     moving = np.hypot(east, north) * 1e6 >= _MIN_SPEED_MPS * np.maximum(span_us, 1)
     moved = np.where(moving & (span_us <= _MAX_STEP_US), np.rad2deg(np.arctan2(east, north)), np.nan)
-    return np.where(np.isnan(given), moved, given) % 360
+    return np.where(np.isfinite(given), given, moved) % 360
