@@ -134,6 +134,16 @@ def test_bad_fixes_are_masked_before_utm(tmp_path: Path) -> None:
     assert track.dropped == {"broken row": 1, "no fix": 2, "out of range": 2, "backwards": 1}
 
 
+@pytest.mark.parametrize("encoding", ["UTF-8", "UTF-8-SIG", "UTF-16", "ISO-8859-1"])
+def test_gpx_in_any_encoding(tmp_path: Path, encoding: str) -> None:
+    point = '<trkpt lat="51" lon="-1"><time>2020-01-01T00:00:00Z</time></trkpt>'
+    text = f'<gpx version="1.1" creator="é"><trk><trkseg>{point}</trkseg></trk></gpx>'
+    declared = encoding.removesuffix("-SIG")
+    path = tmp_path / "walk.gpx"
+    path.write_bytes(f'<?xml version="1.0" encoding="{declared}"?>{text}'.encode(encoding))
+    assert open_track(path).t_us.tolist() == [1577836800000000]
+
+
 def test_odd_cells_cost_one_row_each(tmp_path: Path) -> None:
     rows = [
         "1,51,-1,9",
