@@ -12,7 +12,7 @@ from evplace.errors import OutputError, PlaceMapError, SettingsError
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns
 from evplace.scorers import checked_settings, open_scorer
-from evplace.train import train
+from evplace.training import train
 from evplace.traverse import Traverse
 
 
