@@ -170,7 +170,7 @@ def _spline(rows: NDArray[np.float64], u: float) -> NDArray[np.float64]:
 
 
 def camera_axes(pose: Pose) -> NDArray[np.float64]:
-    """(3, 3) rows: right, down, forward of the camera in the world."""
+    """(3, 3) rows: right, down and forward of the camera in the world."""
     cy, sy = math.cos(pose.yaw), math.sin(pose.yaw)
     cp, sp = math.cos(pose.pitch), math.sin(pose.pitch)
     forward = np.array([cy * cp, sy * cp, sp])

@@ -6,7 +6,7 @@ import math
 
 from evplace.city.jit import compiled
 from evplace.city.light import Light
-from evplace.city.materials import BLACK, Looks, Surface, colour_of
+from evplace.city.materials import BLACK, Look, Surface, colour_of
 from evplace.city.texture import Colour, band, hash01, mix, noise, plus, pulse, scale
 
 WIDTH, HEIGHT, STOREY, PITCH, WINDOW_WIDTH, WINDOW_HEIGHT, GROUND = 3, 4, 5, 6, 7, 8, 9
@@ -19,73 +19,74 @@ CORNICE_M = 0.5
 
 
 @compiled
-def facade(looks: Looks, q: int, s: float, t: float, fs: float, ft: float, light: Light) -> Surface:
+def facade(look: Look, s: float, t: float, fs: float, ft: float, light: Light) -> Surface:
     """A whole wall; s, t in [0, 1], footprints of a pixel in the same units."""
-    u, fu = s * looks[q, WIDTH], fs * looks[q, WIDTH]
-    v, fv = t * looks[q, HEIGHT], ft * looks[q, HEIGHT]
-    surface = (scale(colour_of(looks, q), _wall(looks, q, u, v, fu, fv)), BLACK)
-    ground = looks[q, GROUND]
-    if v > ground - 0.25 * fv and looks[q, HEIGHT] > ground + 0.5:
-        surface = _upper_floors(looks, q, u, v, fu, fv, light, surface)
+    u, fu = s * look[WIDTH], fs * look[WIDTH]
+    v, fv = t * look[HEIGHT], ft * look[HEIGHT]
+    surface = (scale(colour_of(look), _wall(look, u, v, fu, fv)), BLACK)
+    ground = look[GROUND]
+    if v > ground - 0.25 * fv and look[HEIGHT] > ground + 0.5:
+        surface = _upper_floors(look, u, v, fu, fv, light, surface)
     if v < ground + 0.25 * fv:
-        if looks[q, KIND] < SHOP and looks[q, WIDTH] > 5.0:
-            surface = _shop(looks, q, u, v, fu, fv, light, surface)
+        if look[KIND] < SHOP and look[WIDTH] > 5.0:
+            surface = _shop(look, u, v, fu, fv, light, surface)
         else:
-            surface = _house_door(looks, q, u, v, fu, fv, light, surface)
+            surface = _house_door(look, u, v, fu, fv, light, surface)
     return surface
 
 
 @compiled
-def _wall(looks: Looks, q: int, u: float, v: float, fu: float, fv: float) -> float:
+def _wall(look: Look, u: float, v: float, fu: float, fv: float) -> float:
     """Brick courses, panels or storey joints, with stains and grain."""
-    style = int(looks[q, STYLE])
-    seed = int(looks[q, SEED])
+    style = int(look[STYLE])
+    seed = int(look[SEED])
     tone = 1.0
     if style == 0:
         tone = 1.04 - 0.22 * pulse(v / 0.34, fv / 0.34, 0.0, 0.22)
     elif style == 1:
-        tone = 1.0 - 0.35 * pulse(u / looks[q, PITCH], fu / looks[q, PITCH], 0.0, 0.06)
+        tone = 1.0 - 0.35 * pulse(u / look[PITCH], fu / look[PITCH], 0.0, 0.06)
     elif style == 2:
-        tone = 1.0 - 0.3 * pulse((v - looks[q, GROUND]) / looks[q, STOREY], fv / looks[q, STOREY], 0.0, 0.09)
+        tone = 1.0 - 0.3 * pulse((v - look[GROUND]) / look[STOREY], fv / look[STOREY], 0.0, 0.09)
     f = max(fu, fv)
     wear = 0.92 + 0.24 / (1.0 + f * 1.5) * (noise(u * 0.8 + seed * 3.7, v * 1.1, seed) - 0.5)
     wear += 0.22 * (noise(u * 0.17, v * 0.13 + seed, seed + 1) - 0.5)
-    return tone * (wear + 0.14 / (1.0 + f * 8.0) * (noise(u * 5.0, v * 5.0, seed + 2) - 0.5))
+    if f < 1.0:
+        wear += 0.14 / (1.0 + f * 8.0) * (noise(u * 5.0, v * 5.0, seed + 2) - 0.5)
+    return tone * wear
 
 
 @compiled
 def _upper_floors(
-    looks: Looks, q: int, u: float, v: float, fu: float, fv: float, light: Light, surface: Surface
+    look: Look, u: float, v: float, fu: float, fv: float, light: Light, surface: Surface
 ) -> Surface:
     """Windows with frames and sills on each storey, and the cornice."""
     colour, shine = surface
-    seed = int(looks[q, SEED])
-    column, fc = u / looks[q, PITCH], fu / looks[q, PITCH]
-    storey, fr = (v - looks[q, GROUND]) / looks[q, STOREY], fv / looks[q, STOREY]
-    wide, tall = looks[q, WINDOW_WIDTH], looks[q, WINDOW_HEIGHT]
-    inside = band(v, fv, looks[q, GROUND], looks[q, HEIGHT] - CORNICE_M)
+    seed = int(look[SEED])
+    column, fc = u / look[PITCH], fu / look[PITCH]
+    storey, fr = (v - look[GROUND]) / look[STOREY], fv / look[STOREY]
+    wide, tall = look[WINDOW_WIDTH], look[WINDOW_HEIGHT]
+    inside = band(v, fv, look[GROUND], look[HEIGHT] - CORNICE_M)
     across = pulse(column, fc, 0.5 - wide * 0.5, wide)
     pane = across * pulse(storey, fr, 0.5 - tall * 0.5, tall) * inside
     i, j = int(math.floor(column)), int(math.floor(storey))
     if hash01(i, j, seed + 77) > 0.92:
         pane = 0.0  # bricked up
-    style = int(looks[q, STYLE])
+    style = int(look[STYLE])
     if style == 3 or (style == 0 and hash01(i, 3, seed) < 0.4):
         sill = across * pulse(storey, fr, max(0.5 - tall * 0.5 - 0.22, 0.0), 0.2) * inside
         grey = 0.18 if style == 3 else 0.75
         colour = mix(colour, (grey, grey, grey), sill)
     around = pulse(column, fc, 0.45 - wide * 0.5, wide + 0.1) * pulse(storey, fr, 0.47 - tall * 0.5, tall + 0.06)
-    trim = (looks[q, TRIM], looks[q, TRIM], looks[q, TRIM])
+    trim = (look[TRIM], look[TRIM], look[TRIM])
     colour = mix(colour, trim, max(around * inside - pane, 0.0))
-    colour, shine = _window(looks, q, i, j, column, fc, fr, pane, light, colour, shine)
-    cornice = band(v, fv, looks[q, HEIGHT] - CORNICE_M, looks[q, HEIGHT])
+    colour, shine = _window(look, i, j, column, fc, fr, pane, light, colour, shine)
+    cornice = band(v, fv, look[HEIGHT] - CORNICE_M, look[HEIGHT])
     return mix(colour, scale(trim, 0.8), cornice), shine
 
 
 @compiled
 def _window(
-    looks: Looks,
-    q: int,
+    look: Look,
     i: int,
     j: int,
     column: float,
@@ -97,11 +98,11 @@ def _window(
     shine: Colour,
 ) -> Surface:
     """Window (i, j): glass, blinds or light behind it; from afar the mean of all windows."""
-    seed = int(looks[q, SEED])
+    seed = int(look[SEED])
     chance, other = hash01(i, j, seed), hash01(i, j, seed + 77)
     far = min(max((max(fc, fr) - 0.35) / 0.6, 0.0), 1.0)
-    lit = 1.0 if chance < looks[q, LIT] else 0.0
-    lit += (looks[q, LIT] - lit) * far
+    lit = 1.0 if chance < look[LIT] else 0.0
+    lit += (look[LIT] - lit) * far
     grey = 0.45 + 0.2 * chance if other < 0.25 else 0.05 + 0.10 * other
     grey += (0.15 - grey) * far
     pane *= 1.0 - 0.7 * pulse(column * 2.0, fc * 2.0, 0.0, 0.08)
@@ -115,12 +116,12 @@ def _window(
 
 @compiled
 def _shop(
-    looks: Looks, q: int, u: float, v: float, fu: float, fv: float, light: Light, surface: Surface
+    look: Look, u: float, v: float, fu: float, fv: float, light: Light, surface: Surface
 ) -> Surface:
     """Shop fronts side by side: display window, door and sign above."""
     colour, shine = surface
-    seed, ground = int(looks[q, SEED]), looks[q, GROUND]
-    front = looks[q, WIDTH] / max(1.0, math.floor(looks[q, WIDTH] / 5.5))
+    seed, ground = int(look[SEED]), look[GROUND]
+    front = look[WIDTH] / max(1.0, math.floor(look[WIDTH] / 5.5))
     x, fx = u / front, fu / front
     i = int(math.floor(x))
     open_late, stocked = hash01(i, 1, seed + 3), hash01(i, 2, seed + 3)
@@ -168,12 +169,12 @@ def _shop_sign(
 
 @compiled
 def _house_door(
-    looks: Looks, q: int, u: float, v: float, fu: float, fv: float, light: Light, surface: Surface
+    look: Look, u: float, v: float, fu: float, fv: float, light: Light, surface: Surface
 ) -> Surface:
     """A house's ground floor: base course, one door, windows beside it."""
     colour, shine = surface
-    seed, pitch, wide = int(looks[q, SEED]), looks[q, PITCH], looks[q, WINDOW_WIDTH]
-    at = (0.15 + 0.6 * hash01(1, 1, seed + 4)) * looks[q, WIDTH]
+    seed, pitch, wide = int(look[SEED]), look[PITCH], look[WINDOW_WIDTH]
+    at = (0.15 + 0.6 * hash01(1, 1, seed + 4)) * look[WIDTH]
     door = band(u, fu, at, at + 1.3) * band(v, fv, 0.1, 2.5)
     pane = pulse(u / pitch, fu / pitch, 0.5 - wide * 0.5, wide) * band(v, fv, 1.0, 2.5)
     if abs(u - at - 0.65) < 1.3:
@@ -185,6 +186,6 @@ def _house_door(
         0.1 + 0.4 * hash01(1, 4, seed + 4),
     )
     colour = mix(mix(colour, paint, door), (0.1, 0.1, 0.11), pane)
-    if light.night > 0.0 and hash01(int(math.floor(u / pitch)), 9, seed) < looks[q, LIT]:
+    if light.night > 0.0 and hash01(int(math.floor(u / pitch)), 9, seed) < look[LIT]:
         shine = plus(shine, scale((1.0, 0.8, 0.5), pane * light.windows))
     return colour, shine

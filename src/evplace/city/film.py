@@ -11,6 +11,7 @@ import utm
 from numpy.typing import NDArray
 
 from evplace.city import weather
+from evplace.city.culling import group, seen
 from evplace.city.camera import ColourCamera
 from evplace.city.conditions import CONDITIONS, Condition, condition
 from evplace.city.drive import Drive, Pose, camera_axes, drive_along
@@ -79,6 +80,7 @@ class Film:
         self._traffic: Traffic = traffic_for(town, route, self.drive, self._signals, rng)
         still = join([town.scene, parked_cars(town, rng)])
         self._still = len(still.shape)
+        self._groups = group(still)
         self._scene = _with_room(still, MOVING)
         self._maps = light_maps(town, self.light, self._still + MOVING)
         self._size = size
@@ -97,9 +99,8 @@ class Film:
         pose = self.drive.pose(t_us)
         count = self._populate(pose, t_us)
         self._signals.show(self._scene.look, t_us * 1e-6)
-        position = np.array([pose.x, pose.y, pose.z])
-        view = View(position, camera_axes(pose), self._focal, *self._size)
-        draw(self._scene, count, view, self._buffers)
+        view = view_of(pose, self._focal, self._size)
+        draw(self._scene, self._in_sight(view, count), view, self._buffers)
         shade_frame(self._scene, view, self._buffers, self.light, self._maps, self._frame)
         return self._weathered(pose, view, t_us * 1e-6).astype(np.float32)
 
@@ -111,6 +112,10 @@ class Film:
             radiance = self.radiance(t_us)
             camera.expose(radiance, t_us)
             yield city_frame(t_us, radiance, camera.picture(radiance), self.drive.pose(t_us))
+
+    def _in_sight(self, view: View, count: int) -> NDArray[np.int32]:
+        """What may be seen: the groups of still primitives in the field of view, and all that moves."""
+        return np.concatenate([seen(self._groups, view), np.arange(self._still, count, dtype=np.int32)])
 
     def _populate(self, pose: Pose, t_us: int) -> int:
         """Put what moves behind what stands still; returns how many primitives there are."""
@@ -143,11 +148,17 @@ class Film:
         return image
 
     def _veil(self, image: NDArray[np.float64], view: View) -> None:
-        x, y, z = view.axes @ np.array(self.light.towards_sun)
+        x, y, z = np.array([view.right, view.down, view.forward]) @ np.array(self.light.towards_sun)
         if z > 0.1:
             column = x / z * self._focal + 0.5 * view.width
             row = y / z * self._focal + 0.5 * view.height
             weather.veil(image, self._frame.nearness, column, row, self.light.sun)
+
+
+def view_of(pose: Pose, focal: float, size: Size) -> View:
+    """The pinhole camera at a pose."""
+    right, down, forward = (tuple(float(value) for value in row) for row in camera_axes(pose))
+    return View((float(pose.x), float(pose.y), float(pose.z)), right, down, forward, focal, *size)
 
 
 def _with_room(parts: Primitives, extra: int) -> Primitives:

@@ -15,6 +15,9 @@ from evplace.city.jit import compiled
 from evplace.city.texture import Colour, mix, noise, plus, sample, scale, smoothstep
 
 
+Grid = NDArray[np.float32]
+
+
 class Light(NamedTuple):
     """One condition of weather and time of day, as the loops read it."""
 
@@ -47,11 +50,11 @@ class Light(NamedTuple):
 class Maps(NamedTuple):
     """Light worked out once for the whole town, on a grid of one-metre cells."""
 
-    origin: NDArray[np.float64]
-    """(2,) world x, y of the grids' corner."""
-    shadow: NDArray[np.float32]
+    origin: tuple[float, float]
+    """World x, y of the grids' corner."""
+    shadow: Grid
     """(rows, columns) height up to which a point is in the shade, metres."""
-    lamplight: NDArray[np.float32]
+    lamplight: Grid
     """(rows, columns) light of the street lamps on level ground."""
     lamps: NDArray[np.float64]
     """(L, 6) street lamps: x, y, z, and colour."""
@@ -88,51 +91,62 @@ def _cloud(light: Light) -> Colour:
 
 
 @compiled
-def sunlight(position: Colour, normal: Colour, soft: bool, light: Light, maps: Maps) -> Colour:
+def sunlight(
+    position: Colour, normal: Colour, soft: bool, light: Light, shadow: Grid, origin: tuple[float, float]
+) -> Colour:
     """Light of the sun on a surface; `soft` surfaces (leaves) lie half in their own shade."""
     s = light.towards_sun
     facing = normal[0] * s[0] + normal[1] * s[1] + normal[2] * s[2]
     if facing <= 0.0 or light.sun[0] <= 0.0:
         return (0.0, 0.0, 0.0)
-    x = position[0] + 0.6 * normal[0] - maps.origin[0]
-    y = position[1] + 0.6 * normal[1] - maps.origin[1]
-    above = position[2] - sample(maps.shadow, x, y)
+    x = position[0] + 0.6 * normal[0] - origin[0]
+    y = position[1] + 0.6 * normal[1] - origin[1]
+    above = position[2] - sample(shadow, x, y)
     visible = smoothstep(-6.0, -2.0, above) if soft else smoothstep(-0.9, 0.3, above)
     return scale(light.sun, facing * visible)
 
 
 @compiled
-def lamps_on_ground(position: Colour, upness: float, light: Light, maps: Maps) -> Colour:
+def lamps_on_ground(
+    position: Colour, upness: float, light: Light, lamplight: Grid, origin: tuple[float, float]
+) -> Colour:
     """Light of all street lamps on anything but a facade."""
-    level = sample(maps.lamplight, position[0] - maps.origin[0], position[1] - maps.origin[1])
+    level = sample(lamplight, position[0] - origin[0], position[1] - origin[1])
     level *= light.lamps * (0.35 + 0.65 * max(upness, 0.0))
     return (level, level * 0.8, level * 0.52)
 
 
 @compiled
-def lamps_on_facade(q: int, position: Colour, normal: Colour, light: Light, maps: Maps) -> Colour:
+def lamps_on_facade(
+    q: int,
+    position: Colour,
+    normal: Colour,
+    light: Light,
+    near_lamps: NDArray[np.int32],
+    lamps: NDArray[np.float64],
+) -> Colour:
     """Light of the nearest street lamps on a facade, each from its own side."""
     total = (0.0, 0.0, 0.0)
-    for k in range(maps.near_lamps.shape[1]):
-        i = maps.near_lamps[q, k]
+    for k in range(near_lamps.shape[1]):
+        i = near_lamps[q, k]
         if i < 0:
             break
-        x = maps.lamps[i, 0] - position[0]
-        y = maps.lamps[i, 1] - position[1]
-        z = maps.lamps[i, 2] - position[2]
+        x = lamps[i, 0] - position[0]
+        y = lamps[i, 1] - position[1]
+        z = lamps[i, 2] - position[2]
         facing = normal[0] * x + normal[1] * y + normal[2] * z
         if facing > 0.0:
             squared = x * x + y * y + z * z + 1.0
             near = 1.0 / math.sqrt(squared)
             level = facing * near / squared * light.lamps * (0.25 + 0.75 * max(z * near, 0.0))
-            colour = (maps.lamps[i, 3], maps.lamps[i, 4], maps.lamps[i, 5])
+            colour = (lamps[i, 3], lamps[i, 4], lamps[i, 5])
             total = plus(total, scale(colour, level))
     return total
 
 
 @compiled
 def own_headlights(
-    position: Colour, normal: Colour, camera: NDArray[np.float64], ahead: Colour, light: Light
+    position: Colour, normal: Colour, camera: Colour, ahead: Colour, light: Light
 ) -> Colour:
     """Dipped beams from below the camera: a cone with a cut-off just above the horizon."""
     x = position[0] - camera[0]

@@ -29,7 +29,7 @@ def light_maps(town: Town, light: Light, capacity: int) -> Maps:
     if light.night > 0:
         lamplight = _lamplight(town, origin, rows, columns)
         near[: len(town.scene.shape)] = _nearest_lamps(town)
-    return Maps(origin, shadow, lamplight, town.lamps, near)
+    return Maps((float(origin[0]), float(origin[1])), shadow, lamplight, town.lamps, near)
 
 
 def height_map(town: Town, origin: NDArray[np.float64], rows: int, columns: int) -> NDArray[np.float32]:

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from evplace.city.town import Town
 
-CYCLE_S = 28.0
-RED_S = 11.0
+CYCLE_S = 24.0
+RED_S = 7.0
 """Long enough to see cars cross, short enough that a drive stands still for a small part of its time."""
 LEVELS = (0.02, 3.0)
 """Brightness of a light that is off and on, by day and by night alike."""

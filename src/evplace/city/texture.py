@@ -19,13 +19,11 @@ Colour = tuple[float, float, float]
 @compiled
 def hash01(x: int, y: int, seed: int) -> float:
     """A number in [0, 1) that looks random and depends on the three integers only."""
-    mask = np.uint64(0xFFFFFFFF)
-    h = np.uint64(np.int64(x) & 0xFFFFFFFF) * np.uint64(374761393)
-    h += np.uint64(np.int64(y) & 0xFFFFFFFF) * np.uint64(668265263)
-    h = (h + np.uint64(np.int64(seed) & 0xFFFFFFFF) * np.uint64(2246822519)) & mask
-    h = ((h ^ (h >> np.uint64(13))) * np.uint64(1274126177)) & mask
-    h = ((h ^ (h >> np.uint64(16))) * np.uint64(2654435761)) & mask
-    return float(h >> np.uint64(8)) / 16777216.0
+    h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) ^ np.uint64(y) * np.uint64(0xC2B2AE3D27D4EB4F)
+    h ^= np.uint64(seed) * np.uint64(0x165667B19E3779F9)
+    h = (h ^ (h >> np.uint64(32))) * np.uint64(0xD6E8FEB86659FD93)
+    h = (h ^ (h >> np.uint64(32))) * np.uint64(0xD6E8FEB86659FD93)
+    return float(h >> np.uint64(40)) / 16777216.0
 
 
 @compiled
