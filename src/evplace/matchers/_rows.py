@@ -12,30 +12,35 @@ from evplace.errors import ScoresError
 from evplace.matchers import Path, Rows
 
 
-class Answers:
-    """Answers of the queries so far: 17 bytes a query, so that a day's drive fits anywhere."""
+class Columns:
+    """A table that grows by rows: a few numbers a query, so that a day's drive fits anywhere."""
 
-    def __init__(self) -> None:
-        self._item, self._score, self._accepted = array("q"), array("d"), array("b")
+    def __init__(self, codes: str) -> None:
+        self._columns = [array(code) for code in codes]
 
     def __len__(self) -> int:
-        return len(self._item)
+        return len(self._columns[0])
 
-    def extend(
-        self, item: NDArray[np.int64], score: NDArray[np.float64], accepted: NDArray[np.bool_]
-    ) -> None:
-        """Add the answers of the next queries, three arrays (queries,)."""
-        self._item.frombytes(item.astype(np.int64, copy=False).tobytes())
-        self._score.frombytes(score.astype(np.float64, copy=False).tobytes())
-        self._accepted.frombytes(accepted.astype(np.int8).tobytes())
+    def extend(self, *values: NDArray[Any]) -> None:
+        """Add to each column the values of the next queries, an array (queries,) each."""
+        for column, value in zip(self._columns, values, strict=True):
+            column.frombytes(value.astype(np.dtype(column.typecode), copy=False).tobytes())
+
+    def arrays(self) -> list[NDArray[Any]]:
+        """The columns, copied."""
+        return [np.array(column, np.dtype(column.typecode)) for column in self._columns]
+
+
+class Answers(Columns):
+    """What was said of the queries so far, by a matcher that never takes back an answer."""
+
+    def __init__(self) -> None:
+        super().__init__("qdb")
 
     def path(self) -> Path:
         """All answers, copied."""
-        return Path(
-            np.array(self._item, np.int64),
-            np.array(self._score, np.float64),
-            np.array(self._accepted, np.int8).astype(np.bool_),
-        )
+        item, score, accepted = self.arrays()
+        return Path(item, score, accepted.astype(np.bool_))
 
 
 class RowCheck:

@@ -1,0 +1,60 @@
+"""Compressed packets, unpacked to a limit: a damaged length must not fill the memory."""
+
+from __future__ import annotations
+
+import bz2
+import io
+
+import lz4.frame
+import zstandard
+
+LIMIT = 1 << 28
+"""Bytes that one packet may unpack to; those of real recordings are a few megabytes."""
+
+
+class UnpackError(Exception):
+    """The packet cannot be unpacked; the text says why."""
+
+
+def unpack(data: bytes, method: str, limit: int = LIMIT) -> bytes:
+    """`data` unpacked by `method`: "none", "lz4", "zstd" or "bz2". Raises UnpackError."""
+    if method == "none":
+        return data
+    if method not in _METHODS:
+        raise UnpackError(f"unknown compression '{method}'")
+    try:
+        whole = _METHODS[method](data, limit)
+    except (OSError, EOFError, RuntimeError, ValueError, zstandard.ZstdError) as error:
+        raise UnpackError(f"{method} data is damaged: {error}") from error
+    if len(whole) > limit:
+        raise UnpackError(f"{method} data unpacks to more than {limit >> 20} MiB")
+    return whole
+
+
+def _lz4(data: bytes, limit: int) -> bytes:
+    unpacker = lz4.frame.LZ4FrameDecompressor()
+    step = max(4 * len(data), 1 << 16)
+    whole = [unpacker.decompress(data, step)]
+    size = len(whole[0])
+    while not unpacker.eof and not unpacker.needs_input and size <= limit:
+        whole.append(unpacker.decompress(b"", step))
+        size += len(whole[-1])
+    if not unpacker.eof and size <= limit:
+        raise EOFError("it ends too early")
+    return b"".join(whole)
+
+
+def _zstd(data: bytes, limit: int) -> bytes:
+    with zstandard.ZstdDecompressor(max_window_size=limit).stream_reader(io.BytesIO(data)) as reader:
+        return reader.read(limit + 1)
+
+
+def _bz2(data: bytes, limit: int) -> bytes:
+    unpacker = bz2.BZ2Decompressor()
+    whole = unpacker.decompress(data, limit + 1)
+    if not unpacker.eof and len(whole) <= limit:
+        raise EOFError("it ends too early")
+    return whole
+
+
+_METHODS = {"lz4": _lz4, "zstd": _zstd, "bz2": _bz2}

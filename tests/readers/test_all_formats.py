@@ -1,0 +1,152 @@
+"""What holds for every format: the events come back, a cut leaves the good part, damage one error."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made import MAKERS, SIZE, some_events
+
+from evplace import plugs
+from evplace.errors import DamagedRecordingError, EvplaceError, RecordingError
+from evplace.events import Events
+from evplace.readers import open_recording
+
+CUTS = int(os.environ.get("EVPLACE_CUTS", "30"))
+FLIPS = int(os.environ.get("EVPLACE_FLIPS", "200"))
+SEED = int(os.environ.get("EVPLACE_SEED", "0"))
+UNREADABLE_WHEN_CUT = ("npz",)
+"""Formats whose arrays stand one behind the other, so that a cut takes the last ones whole."""
+formats = pytest.mark.parametrize("form", sorted(MAKERS))
+
+
+def test_each_format_has_a_maker() -> None:
+    assert sorted(MAKERS) == plugs.names("readers")
+
+
+def read_all(path: Path) -> tuple[list[Events], EvplaceError | None]:
+    """All packets, and the error that ended them."""
+    packets: list[Events] = []
+    try:
+        for packet in open_recording(path, SIZE).packets():
+            packets.append(packet)
+    except EvplaceError as error:
+        return packets, error
+    return packets, None
+
+
+def sorted_rows(events: Events) -> np.ndarray:
+    """Formats may change the order of events of one time."""
+    order = np.lexsort((events.p, events.x, events.y, events.t_us))
+    return np.stack([events.t_us[order], events.x[order], events.y[order], events.p[order]])
+
+
+@formats
+def test_events_come_back(form: str, tmp_path: Path) -> None:
+    events = some_events()
+    recording = open_recording(MAKERS[form](tmp_path, events))
+    back = Events.concatenate(list(recording.packets()))
+    shift = back.t_us[0] - events.t_us[0] if form.startswith("ros") else 0
+    assert (recording.format, recording.size, back.size) == (form, SIZE, SIZE)
+    moved = Events(events.t_us + shift, events.x, events.y, events.p, SIZE)
+    assert np.array_equal(sorted_rows(back), sorted_rows(moved))
+    assert (back.t_us.dtype, back.x.dtype, back.p.dtype) == (np.int64, np.uint16, np.bool_)
+    assert (recording.events, sum(recording.dropped.values())) == (len(events), 0)
+    assert sum(len(packet) for packet in recording.packets()) == len(events), "a second reading starts anew"
+
+
+@formats
+def test_a_cut_anywhere_delivers_what_came_before(form: str, tmp_path: Path) -> None:
+    path = MAKERS[form](tmp_path, some_events())
+    whole, data = Events.concatenate(read_all(path)[0]), path.read_bytes()
+    rng, cut_file, most = random.Random(SEED), tmp_path / f"cut{path.suffix}", 0
+    for at in [*(rng.randrange(len(data)) for _ in range(CUTS)), len(data) * 9 // 10]:
+        cut_file.write_bytes(data[:at])
+        packets, error = read_all(cut_file)
+        count = sum(map(len, packets))
+        most = max(most, count)
+        if packets:
+            assert np.array_equal(Events.concatenate(packets).t_us, whole.t_us[:count])
+        assert error is None or isinstance(error, RecordingError)
+        assert "\n" not in str(error)
+    assert most > len(whole) // 2 or form in UNREADABLE_WHEN_CUT
+
+
+@formats
+def test_flipped_bytes_give_events_in_order_or_our_error(form: str, tmp_path: Path) -> None:
+    path = MAKERS[form](tmp_path, some_events())
+    data, rng = path.read_bytes(), random.Random(SEED + 1)
+    flipped_file = tmp_path / f"flipped{path.suffix}"
+    for number in range(FLIPS):
+        # Half of them where the structure is, at the start.
+        at = rng.randrange(len(data) if number % 2 else min(len(data), 2000))
+        flipped_file.write_bytes(data[:at] + bytes([data[at] ^ 1 << rng.randrange(8)]) + data[at + 1 :])
+        start = time.monotonic()
+        packets, _ = read_all(flipped_file)
+        assert time.monotonic() - start < 10
+        last = -(1 << 63)
+        for packet in packets:
+            assert np.all(np.diff(packet.t_us) >= 0)
+            assert packet.t_us[0] >= last
+            assert packet.x.max() < SIZE[0]
+            assert packet.y.max() < SIZE[1]
+            last = packet.t_us[-1]
+
+
+def test_a_cut_inside_a_word_is_said(tmp_path: Path) -> None:
+    path = MAKERS["aedat2"](tmp_path, some_events())
+    path.write_bytes(path.read_bytes()[:-3])
+    packets, error = read_all(path)
+    assert sum(map(len, packets)) == 2999
+    assert isinstance(error, DamagedRecordingError)
+    assert "cut off" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(None, "No such file"), (b"", "is empty"), (b"GIF89a junk", "no known recording format")],
+)
+def test_what_is_no_recording_is_said(content: bytes | None, words: str, tmp_path: Path) -> None:
+    path = tmp_path / "holiday.aedat4"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(RecordingError, match=words):
+        open_recording(path)
+
+
+def test_unknown_content_lists_the_known_formats(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"folder.*aedat4.*ros1"):
+        open_recording(tmp_path)
+
+
+@formats
+def test_a_name_does_not_matter(form: str, tmp_path: Path) -> None:
+    path = MAKERS[form](tmp_path, some_events(50))
+    assert open_recording(path.rename(tmp_path / "recording.xyz")).format == form
+
+
+def test_memory_is_bounded(tmp_path: Path) -> None:
+    """40 M events of a sparse-looking file stay under 400 MB in a process of their own."""
+    path, one = tmp_path / "long.dat", np.zeros(1_000_000, [("t", "<u4"), ("data", "<u4")])
+    with path.open("wb") as file:
+        file.write(b"% Version 2\n% Width 640\n% Height 480\n\x0c\x08")
+        for part in range(20):
+            one["t"] = np.arange(part * 1_000_000, (part + 1) * 1_000_000)
+            file.write(one.tobytes())
+    code = (
+        "import resource, sys; from evplace.readers import open_recording; r = open_recording(sys.argv[1])\n"
+        "for packet in r.packets(): pass\n"
+        "print(r.events, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
+    )
+    events, megabytes = map(int, answer.stdout.split())
+    assert events == 20_000_000
+    assert megabytes < 400
