@@ -53,6 +53,27 @@ class ColourCamera:
 
 
 @compiled
+def luminance(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(H, W) linear light of a (H, W, 3) frame: what an event sensor without colours sees."""
+    out = np.empty(radiance.shape[:2], np.float32)
+    for y in range(radiance.shape[0]):
+        for x in range(radiance.shape[1]):
+            out[y, x] = 0.299 * radiance[y, x, 0] + 0.587 * radiance[y, x, 1] + 0.114 * radiance[y, x, 2]
+    return out
+
+
+@compiled
+def grey(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(H, W) uint8 grey of a (H, W, 3) picture (ITU-R BT.601)."""
+    out = np.empty(picture.shape[:2], np.uint8)
+    for y in range(picture.shape[0]):
+        for x in range(picture.shape[1]):
+            value = 0.299 * picture[y, x, 0] + 0.587 * picture[y, x, 1] + 0.114 * picture[y, x, 2]
+            out[y, x] = int(value + 0.5)
+    return out
+
+
+@compiled
 def _mean(radiance: NDArray[np.float32]) -> float:
     """The mean brightness of the frame's middle, lights cut off: every second pixel is enough."""
     height, width, _ = radiance.shape

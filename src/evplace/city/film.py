@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-import utm
 from numpy.typing import NDArray
 
 from evplace.city import weather
@@ -33,6 +33,21 @@ ZONE, EAST, NORTH, TURN = 10, 585_900.0, 4_134_000.0, math.radians(23.0)
 """UTM zone and anchor of the town, and its turn against the grid, so that places do not follow streets."""
 
 
+class GeoPose(NamedTuple):
+    """Where the camera is on the map and where it looks."""
+
+    easting: float
+    northing: float
+    """UTM metres in ZONE, northern half."""
+    height: float
+    """Metres above the town's datum."""
+    yaw: float
+    """Radians, counter-clockwise from east."""
+    pitch: float
+    roll: float
+    """Radians."""
+
+
 @dataclass(frozen=True)
 class CityFrame:
     """One frame of a drive."""
@@ -43,19 +58,7 @@ class CityFrame:
     """(H, W, 3) linear red, green, blue."""
     colour: NDArray[np.uint8]
     """(H, W, 3) the colour camera's picture: exposed, gamma-coded, without noise."""
-    easting: float
-    northing: float
-    """UTM metres."""
-    height: float
-    """Metres above the town's datum."""
-    yaw: float
-    """Radians, counter-clockwise from east."""
-    pitch: float
-    roll: float
-    """Radians."""
-    latitude: float
-    longitude: float
-    """WGS84 degrees."""
+    pose: GeoPose
 
 
 class Film:
@@ -104,14 +107,17 @@ class Film:
         shade_frame(self._scene, view, self._buffers, self.light, self._maps, self._frame)
         return self._weathered(pose, view, t_us * 1e-6).astype(np.float32)
 
-    def frames(self, fps: float) -> Iterator[CityFrame]:
+    def times(self, fps: int) -> list[int]:
+        """The times of all frames at an even rate, microseconds."""
+        return [round(k * 1_000_000 / fps) for k in range(self.drive.duration_us * fps // 1_000_000 + 1)]
+
+    def frames(self, fps: int) -> Iterator[CityFrame]:
         """All frames of the drive at an even rate, with the colour camera's pictures."""
         camera = ColourCamera([0])
-        for k in range(int(self.drive.duration_us * fps / 1e6)):
-            t_us = round(k * 1e6 / fps)
+        for t_us in self.times(fps):
             radiance = self.radiance(t_us)
             camera.expose(radiance, t_us)
-            yield city_frame(t_us, radiance, camera.picture(radiance), self.drive.pose(t_us))
+            yield CityFrame(t_us, radiance, camera.picture(radiance), geo_pose(self.drive.pose(t_us)))
 
     def _in_sight(self, view: View, count: int) -> NDArray[np.int32]:
         """What may be seen: the groups of still primitives in the field of view, and all that moves."""
@@ -165,22 +171,14 @@ def _with_room(parts: Primitives, extra: int) -> Primitives:
     return Primitives(*(np.concatenate([a, np.zeros((extra, *a.shape[1:]), a.dtype)]) for a in parts))
 
 
-def city_frame(t_us: int, radiance: NDArray[np.float32], colour: NDArray[np.uint8], pose: Pose) -> CityFrame:
-    """A frame with its pose in UTM and WGS84."""
+def geo_pose(pose: Pose) -> GeoPose:
+    """A pose of the town's own metres on the map."""
     c, s = math.cos(TURN), math.sin(TURN)
-    easting, northing = EAST + c * pose.x - s * pose.y, NORTH + s * pose.x + c * pose.y
-    latitude, longitude = utm.to_latlon(easting, northing, ZONE, northern=True)
-    yaw = math.remainder(pose.yaw + TURN, 2 * math.pi)
-    return CityFrame(
-        t_us,
-        radiance,
-        colour,
-        easting,
-        northing,
-        pose.z,
-        yaw,
-        pose.pitch,
-        pose.roll,
-        float(latitude),
-        float(longitude),
+    return GeoPose(
+        EAST + c * float(pose.x) - s * float(pose.y),
+        NORTH + s * float(pose.x) + c * float(pose.y),
+        float(pose.z),
+        math.remainder(float(pose.yaw) + TURN, 2 * math.pi),
+        float(pose.pitch),
+        float(pose.roll),
     )

@@ -80,13 +80,18 @@ MIN_THRESHOLD = 0.01
 class Simulator:
     """One sensor: takes frames in the order of time and gives the events between them."""
 
-    def __init__(self, size: Size, settings: SensorSettings | None = None, seed: int = 0) -> None:
-        """For frames of `size` (width, height); the seed draws thresholds, hot pixels and noise."""
+    def __init__(
+        self, size: Size, settings: SensorSettings | None = None, seed: int = 0, drive: int = 0
+    ) -> None:
+        """For frames of `size` (width, height). `seed` draws what is the sensor's own, its thresholds and
+        hot pixels; both draw the noise, which differs from one `drive` to the next.
+        """
         self.size = size
         self.settings = settings or SensorSettings()
-        self._rng = np.random.default_rng(seed)
-        self._on, self._off = (self._thresholds(mean) for mean in _means(self.settings))
-        self._hot = self._hot_pixels()
+        own = np.random.default_rng([seed, 0])
+        self._on, self._off = (self._thresholds(mean, own) for mean in _means(self.settings))
+        self._hot = self._hot_pixels(own)
+        self._rng = np.random.default_rng([seed, 1, drive])
         shape = (size[1], size[0])
         self._level = np.zeros(shape, np.float32)
         self._before: Frame | None = None
@@ -165,14 +170,14 @@ class Simulator:
         )
         return total
 
-    def _thresholds(self, mean: float) -> NDArray[np.float32]:
+    def _thresholds(self, mean: float, rng: np.random.Generator) -> NDArray[np.float32]:
         """(H, W) one threshold a pixel."""
-        drawn = self._rng.normal(mean, self.settings.threshold_spread, (self.size[1], self.size[0]))
+        drawn = rng.normal(mean, self.settings.threshold_spread, (self.size[1], self.size[0]))
         return np.maximum(drawn, MIN_THRESHOLD).astype(np.float32)
 
-    def _hot_pixels(self) -> NDArray[np.int64]:
+    def _hot_pixels(self, rng: np.random.Generator) -> NDArray[np.int64]:
         pixels = self.size[0] * self.size[1]
-        return self._rng.choice(pixels, round(self.settings.hot_pixels * pixels), replace=False)
+        return rng.choice(pixels, round(self.settings.hot_pixels * pixels), replace=False)
 
     def _check(self, frame: Frame, t_us: int) -> None:
         if frame.ndim != 2 or (frame.shape[1], frame.shape[0]) != self.size:
