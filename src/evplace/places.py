@@ -44,6 +44,9 @@ class Places(Protocol):
     def accepts(self, places: ArrayLike, where: ArrayLike) -> Bools:
         """(n,) whether the answer `places` (n,) is right for the images at `where`; -1 never is."""
 
+    def right(self, where: Any) -> Bools:
+        """(n, places) which places are right answers for each image."""
+
     def centres(self) -> Floats:
         """(places, 2) metres, NaN where places have no position."""
 

@@ -74,8 +74,10 @@ def locked(target: Path) -> Iterator[None]:
             raise OutputError(
                 f"{target} is being written by another process: wait for it, or write elsewhere"
             )
-        yield
-        lock.unlink(missing_ok=True)
+        try:
+            yield
+        finally:
+            lock.unlink(missing_ok=True)
     finally:
         os.close(handle)
 
@@ -126,6 +128,11 @@ class GrowingArray:
         self._file.seek(0)
         self._write_header()
         self._file.close()
+
+    def discard(self) -> None:
+        """Let go of a file that will not be used; harmless after `close`."""
+        with contextlib.suppress(OSError):
+            self._file.close()
 
     def _write_header(self) -> None:
         shape = (self._length, *self._item_shape)

@@ -92,7 +92,7 @@ def _sift(
 ) -> int:
     """Mark what is dropped in `keep`, count it in `drops`; return how many events are decided."""
     last = t_us[start - 1] if start > 0 else last_us
-    fault_until = 0  # up to here a step forward is known to be a fault
+    fault_until, fault_us = 0, last_us  # up to here steps forward, to about this time, are known to be faults
     for i in range(start, len(t_us)):
         t = t_us[i]
         if x[i] >= width or y[i] >= height:
@@ -109,8 +109,8 @@ def _sift(
                 if end < i + 1 + LOOK_AHEAD and not final:
                     return i
                 if _comes_back(t_us[i + 1 : end], t, last):
-                    fault_until = end
-            if i < fault_until:
+                    fault_until, fault_us = end, t
+            if i < fault_until and (last != NOTHING_YET or t >= fault_us - JUMP_US // 2):
                 keep[i] = False
                 drops[2] += 1
                 continue

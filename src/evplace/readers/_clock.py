@@ -2,7 +2,8 @@
 
 A counter of b bits is read as going forward, any number of times around; steps back of up to a sixteenth of
 its range stay steps back. One wrong value must not shift all that follow: after a leap, the value before it
-is remembered, and a counter that returns there has not wrapped.
+is remembered, and a counter that returns there has not
+wrapped. (So a clock must be read more than twice a turn; cameras send theirs hundreds of times.)
 """
 
 from __future__ import annotations

@@ -48,7 +48,9 @@ _Layout = dict[str, tuple[str, str | None]]
 
 def matches(path: Path, head: bytes) -> bool:
     """Whether it is a zip archive that starts with an array."""
-    return head.startswith(b"PK\x03\x04") and head[30:30 + head[26]].endswith(b".npy")  # fmt: skip
+    return head.startswith(b"PK\x03\x04") and head[30 : 30 + int.from_bytes(head[26:28], "little")].endswith(
+        b".npy"
+    )
 
 
 def read(path: Path, hints: Hints) -> Source:
