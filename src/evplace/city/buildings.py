@@ -69,7 +69,15 @@ def build_house(mesh: Mesh, terrain: Terrain, lot: Lot, usual: float, rng: np.ra
     feet = terrain.world(*np.transpose(lot.corners))
     base = float(feet[:, 2].min()) - 0.1
     feet[:, 2] = base
-    shop = _walls(mesh, feet, lot, height + float(np.ptp(terrain.world(*np.transpose(lot.corners))[:, 2])), storey, ground, rng)
+    shop = _walls(
+        mesh,
+        feet,
+        lot,
+        height + float(np.ptp(terrain.world(*np.transpose(lot.corners))[:, 2])),
+        storey,
+        ground,
+        rng,
+    )
     if storeys <= 2 and rng.random() < 0.7:
         _pitched_roof(mesh, feet + (0, 0, height), lot.side, rng)
     street = terrain.world(*np.mean([lot.corners[lot.side], lot.corners[(lot.side + 1) % 4]], axis=0))
@@ -96,7 +104,19 @@ def _walls(
         along = feet[(k + 1) % 4] - feet[k]
         width = float(np.hypot(along[0], along[1]))
         ground_floor = kind if k == lot.side else 0.9
-        look = (*colour, width, height, storey, *windows, ground, seed + k * 7, style, trim, lit, ground_floor)
+        look = (
+            *colour,
+            width,
+            height,
+            storey,
+            *windows,
+            ground,
+            seed + k * 7,
+            style,
+            trim,
+            lit,
+            ground_floor,
+        )
         mesh.quad(feet[k], along, (0, 0, height), FACADE, look)
     return bool(kind < SHOP)
 
@@ -115,7 +135,9 @@ def _pitched_roof(mesh: Mesh, eaves: NDArray[np.float64], side: int, rng: np.ran
         mesh.box((a + b + c + d) / 4 + rise * 0.5, (0.4, 0.4), float(rise[2]), 0.3, PLAIN, (0.35, 0.2, 0.15))
 
 
-def _hangings(mesh: Mesh, feet: NDArray[np.float64], side: int, street: float, rng: np.random.Generator) -> None:
+def _hangings(
+    mesh: Mesh, feet: NDArray[np.float64], side: int, street: float, rng: np.random.Generator
+) -> None:
     """A sign that hangs out over the pavement, an awning over the shop window."""
     a, b = feet[side].copy(), feet[(side + 1) % 4].copy()
     a[2] = b[2] = street
@@ -125,7 +147,17 @@ def _hangings(mesh: Mesh, feet: NDArray[np.float64], side: int, street: float, r
     if rng.random() < 0.7:
         foot = (a + b) / 2 + along * rng.uniform(-0.4, 0.4) * width + (0, 0, rng.uniform(2.8, 4.2))
         size, tall = out * rng.uniform(0.6, 1.2), (0, 0, rng.uniform(0.6, 2.2))
-        look = (*rng.uniform(0.1, 0.8, 3), rng.choice([0, 2.0, 3.0]), 0, 0, 0, 0, 0, 0, int(rng.integers(1, 30000)))
+        look = (
+            *rng.uniform(0.1, 0.8, 3),
+            rng.choice([0, 2.0, 3.0]),
+            0,
+            0,
+            0,
+            0,
+            0,
+            0,
+            int(rng.integers(1, 30000)),
+        )
         mesh.quad(foot, size, tall, SIGN, look)
         mesh.quad(foot + size, -size, tall, SIGN, look)
     if rng.random() < 0.4:

@@ -76,7 +76,9 @@ def _upper_floors(
         sill = across * pulse(storey, fr, max(0.5 - tall * 0.5 - 0.22, 0.0), 0.2) * inside
         grey = 0.18 if style == 3 else 0.75
         colour = mix(colour, (grey, grey, grey), sill)
-    around = pulse(column, fc, 0.45 - wide * 0.5, wide + 0.1) * pulse(storey, fr, 0.47 - tall * 0.5, tall + 0.06)
+    around = pulse(column, fc, 0.45 - wide * 0.5, wide + 0.1) * pulse(
+        storey, fr, 0.47 - tall * 0.5, tall + 0.06
+    )
     trim = (look[TRIM], look[TRIM], look[TRIM])
     colour = mix(colour, trim, max(around * inside - pane, 0.0))
     colour, shine = _window(look, i, j, column, fc, fr, pane, light, colour, shine)
@@ -115,9 +117,7 @@ def _window(
 
 
 @compiled
-def _shop(
-    look: Look, u: float, v: float, fu: float, fv: float, light: Light, surface: Surface
-) -> Surface:
+def _shop(look: Look, u: float, v: float, fu: float, fv: float, light: Light, surface: Surface) -> Surface:
     """Shop fronts side by side: display window, door and sign above."""
     colour, shine = surface
     seed, ground = int(look[SEED]), look[GROUND]

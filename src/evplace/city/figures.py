@@ -84,7 +84,9 @@ def _cabin(
     narrow = inset / (2 * width)
     wide = (0, 2 * width, 0)
     mesh.quad((front, -width, belt), wide, (-lean[1], 0, tall), GLASS, WINDOW, taper=(narrow, narrow))
-    mesh.quad((rear, width, belt), (0, -2 * width, 0), (lean[0], 0, tall), GLASS, WINDOW, taper=(narrow, narrow))
+    mesh.quad(
+        (rear, width, belt), (0, -2 * width, 0), (lean[0], 0, tall), GLASS, WINDOW, taper=(narrow, narrow)
+    )
     flat = length - lean[0] - lean[1]
     top = (rear + lean[0], -width + inset, roof)
     mesh.quad(top, (flat, 0, 0), (0, 2 * (width - inset), 0), PLAIN, paint)

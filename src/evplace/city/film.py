@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.city import weather
-from evplace.city.culling import group, seen
 from evplace.city.camera import ColourCamera
 from evplace.city.conditions import CONDITIONS, Condition, condition
+from evplace.city.culling import group, seen
 from evplace.city.drive import Drive, Pose, camera_axes, drive_along
 from evplace.city.lightmaps import light_maps
 from evplace.city.mesh import Primitives, join
@@ -94,7 +94,9 @@ class Film:
             np.empty((2 * height, 2 * width), np.int32),
             np.empty((self._still + MOVING, 9)),
         )
-        self._frame = Frame(np.empty((height, width, 3)), np.empty((height, width)), np.empty((height, width)))
+        self._frame = Frame(
+            np.empty((height, width, 3)), np.empty((height, width)), np.empty((height, width))
+        )
         self._spare = np.empty((height, width, 3))
 
     def radiance(self, t_us: int) -> NDArray[np.float32]:
@@ -140,7 +142,9 @@ class Film:
         image, near = self._frame.radiance, self._frame.nearness
         if self.condition.wet > 0:
             tilt = math.tan(pose.pitch - pose.slope) * self._focal
-            weather.mirror(image, near, self._frame.ground, self._focal, tilt, self.condition.wet, self._spare)
+            weather.mirror(
+                image, near, self._frame.ground, self._focal, tilt, self.condition.wet, self._spare
+            )
             image, spare = self._spare, image
         else:
             spare = self._spare

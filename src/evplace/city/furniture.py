@@ -118,7 +118,9 @@ def _small_things(
             along += gap * rng.uniform(0.6, 1.4)
 
 
-def plant(mesh: Mesh, foot: NDArray[np.float64], rng: np.random.Generator, size: float, kept: Furniture) -> None:
+def plant(
+    mesh: Mesh, foot: NDArray[np.float64], rng: np.random.Generator, size: float, kept: Furniture
+) -> None:
     """A tree: broad, slim or a conifer."""
     kind = rng.random()
     trunk = rng.uniform(2.0, 3.0) * size + 0.5

@@ -79,7 +79,9 @@ def _claim(folder: Path, settings: CitySettings) -> None:
         other = [key for key in sorted(wanted | found) if wanted.get(key) != found.get(key)]
         if other:
             told = ", ".join(f"{key} {found.get(key)} (now {wanted.get(key)})" for key in other)
-            raise OutputError(f"{folder} holds drives made with other settings: {told}; choose another folder")
+            raise OutputError(
+                f"{folder} holds drives made with other settings: {told}; choose another folder"
+            )
         return
     if folder.exists() and any(folder.iterdir()):
         raise OutputError(f"{folder} is not empty and holds no drives: choose another folder")
@@ -149,7 +151,9 @@ def _work(
     tell: Callable[[float], None],
 ) -> None:
     """One drive in a process of its own; its lines are shares, or an error."""
-    job = json.dumps({"out": str(folder), "settings": to_dict(settings), "condition": pair[0], "path": pair[1]})
+    job = json.dumps(
+        {"out": str(folder), "settings": to_dict(settings), "condition": pair[0], "path": pair[1]}
+    )
     command = [sys.executable, "-m", "evplace.city.worker", job]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=_environment()) as process:
         running.append(process)

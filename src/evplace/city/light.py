@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from evplace.city.jit import compiled
 from evplace.city.texture import Colour, mix, noise, plus, sample, scale, smoothstep
 
-
 Grid = NDArray[np.float32]
 
 
@@ -145,9 +144,7 @@ def lamps_on_facade(
 
 
 @compiled
-def own_headlights(
-    position: Colour, normal: Colour, camera: Colour, ahead: Colour, light: Light
-) -> Colour:
+def own_headlights(position: Colour, normal: Colour, camera: Colour, ahead: Colour, light: Light) -> Colour:
     """Dipped beams from below the camera: a cone with a cut-off just above the horizon."""
     x = position[0] - camera[0]
     y = position[1] - camera[1]

@@ -50,7 +50,9 @@ class CitySettings:
                 raise SettingsError(f"unknown sensor '{name}': known are {', '.join(PRESETS)}")
         for name in ("fps", "width", "height", "image_hz"):
             if getattr(self, name) < 1:
-                raise SettingsError(f"the setting '{name}' cannot be {getattr(self, name)}: it must be above 0")
+                raise SettingsError(
+                    f"the setting '{name}' cannot be {getattr(self, name)}: it must be above 0"
+                )
         if not self.conditions or not self.paths or min(self.paths) < 1:
             raise SettingsError("give at least one condition and one path; paths are numbered from 1")
         if self.fps % self.image_hz:
@@ -58,7 +60,9 @@ class CitySettings:
         if self.window_us * self.image_hz > 1_000_000:
             raise SettingsError(f"'dt' {self.dt} is longer than the time between images: lower 'image_hz'")
         if self.route_length_m and self.route_length_m < 60:
-            raise SettingsError(f"'route_length_m' cannot be {self.route_length_m}: 60 at least, or 0 for all")
+            raise SettingsError(
+                f"'route_length_m' cannot be {self.route_length_m}: 60 at least, or 0 for all"
+            )
 
     @property
     def window_us(self) -> int:

@@ -33,7 +33,10 @@ def record_drive(out: Path, town: Town, settings: CitySettings, name: str, path:
     """Drive once and write `out/<condition>-<path>`, which appears whole when the drive has ended."""
     size = (settings.width, settings.height)
     film = Film(town, path, name, size, settings.seed, settings.route_length_m or None)
-    with new_folder(out / drive_name(name, path), overwrite=True) as folder, contextlib.ExitStack() as open_now:
+    with (
+        new_folder(out / drive_name(name, path), overwrite=True) as folder,
+        contextlib.ExitStack() as open_now,
+    ):
         info = {"source": VERSION, "condition": name, "path": path, **settings.of_drive()}
         sensors = [
             _Sensor(open_now, folder, preset, size, settings, drive_number(name, path), info)

@@ -25,7 +25,19 @@ from evplace.city.light import (
     sunlight,
     through_air,
 )
-from evplace.city.materials import CAR_SIDE, FACADE, FENCE, GLASS, LAMP, LEAVES, PAVEMENT, ROAD, ROOF, SIGN, Look
+from evplace.city.materials import (
+    CAR_SIDE,
+    FACADE,
+    FENCE,
+    GLASS,
+    LAMP,
+    LEAVES,
+    PAVEMENT,
+    ROAD,
+    ROOF,
+    SIGN,
+    Look,
+)
 from evplace.city.mesh import SPHERE, Primitives
 from evplace.city.raster import Buffers, View, sample_offset
 from evplace.city.texture import Colour, mix, plus, scale, smoothstep, times
@@ -63,7 +75,9 @@ Plane = tuple[float, float, float, float, float, float, float, float, float]
 
 
 @compiled
-def shade_frame(scene: Primitives, view: View, buffers: Buffers, light: Light, maps: Maps, frame: Frame) -> None:
+def shade_frame(
+    scene: Primitives, view: View, buffers: Buffers, light: Light, maps: Maps, frame: Frame
+) -> None:
     """Every pixel as the mean of its four samples."""
     owners, planes, radiance = buffers.owner, buffers.planes, frame.radiance
     frames, shapes, kinds, normals, looks = scene.frame, scene.shape, scene.material, scene.normal, scene.look

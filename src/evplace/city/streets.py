@@ -84,7 +84,23 @@ def close_vistas(mesh: Mesh, streets: Streets, terrain: Terrain, rng: np.random.
                     a, b = b, a
                 ends = [terrain.world(u, end) if along_y else terrain.world(end, u) for u in (a, b)]
                 tall = rng.uniform(10, 18)
-                look = (0.5, 0.45, 0.4, 18.0, tall, 3.2, 2.4, 0.5, 0.55, 3.8, rng.integers(1, 30000), 2, 0.6, 0.3, 0.9)
+                look = (
+                    0.5,
+                    0.45,
+                    0.4,
+                    18.0,
+                    tall,
+                    3.2,
+                    2.4,
+                    0.5,
+                    0.55,
+                    3.8,
+                    rng.integers(1, 30000),
+                    2,
+                    0.6,
+                    0.3,
+                    0.9,
+                )
                 mesh.quad(ends[0], ends[1] - ends[0], (0, 0, tall), FACADE, look)
 
 
@@ -127,7 +143,12 @@ def _kerbs(
     x0, x1, y0, y1 = block
     xs = [x for x in lines_x if x0 <= x <= x1]
     ys = [y for y in lines_y if y0 <= y <= y1]
-    ring = [(x, y0) for x in xs] + [(x1, y) for y in ys] + [(x, y1) for x in xs[::-1]] + [(x0, y) for y in ys[::-1]]
+    ring = (
+        [(x, y0) for x in xs]
+        + [(x1, y) for y in ys]
+        + [(x, y1) for x in xs[::-1]]
+        + [(x0, y) for y in ys[::-1]]
+    )
     feet = terrain.world([x for x, _ in ring], [y for _, y in ring])
     for a, b in zip(feet, feet[1:], strict=False):
         if np.hypot(*(b - a)[:2]) > 0.1:

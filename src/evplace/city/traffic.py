@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +112,8 @@ def traffic_for(
     """Draw who is about in one drive."""
     length = route.length_m
     oncoming = [
-        (rng.uniform(0, 2.0 * length), rng.uniform(7, 11), rng.integers(CARS)) for _ in range(int(length / 70))
+        (rng.uniform(0, 2.0 * length), rng.uniform(7, 11), rng.integers(CARS))
+        for _ in range(int(length / 70))
     ]
     walkers = [
         (
@@ -151,7 +152,10 @@ def _leaders(drive: Drive, length: float, rng: np.random.Generator) -> NDArray[n
 def parked_cars(town: Town, rng: np.random.Generator) -> Primitives:
     """Cars along the kerbs of every street, here denser, there sparser."""
     parts = [Mesh().primitives()]
-    for along_y, axis, other in ((True, town.streets.x, town.streets.y), (False, town.streets.y, town.streets.x)):
+    for along_y, axis, other in (
+        (True, town.streets.x, town.streets.y),
+        (False, town.streets.y, town.streets.x),
+    ):
         for at in axis:
             for start, end in zip(other + 14, other[1:] - 14, strict=False):
                 for side in (-1, 1):
@@ -182,11 +186,11 @@ def _dark(parts: Primitives) -> Primitives:
     return parts._replace(look=look)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _car(number: int) -> Primitives:
     return car(number)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _person(number: int, stride: int) -> Primitives:
     return person(number, stride)

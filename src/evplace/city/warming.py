@@ -22,6 +22,8 @@ def warm(settings: CitySettings) -> None:
         for t_us in (0, 100_000):
             radiance = film.radiance(t_us)
             camera.expose(radiance, t_us)
-            for sensor, frame in zip(sensors, (luminance(radiance), grey(camera.picture(radiance))), strict=True):
+            for sensor, frame in zip(
+                sensors, (luminance(radiance), grey(camera.picture(radiance))), strict=True
+            ):
                 imager.add(sensor.push(frame, t_us))
             imager.image(t_us)

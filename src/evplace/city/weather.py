@@ -18,7 +18,9 @@ BOX_M = (12.0, 9.0, 7.0)
 
 
 @compiled
-def mirror(image: Image, nearness: Image, ground: Image, focal: float, tilt: float, wet: float, out: Image) -> None:
+def mirror(
+    image: Image, nearness: Image, ground: Image, focal: float, tilt: float, wet: float, out: Image
+) -> None:
     """`image` into `out`, with the road as a mirror about the horizon, blurred downwards; more at a flat
     angle. `tilt` is the camera's pitch against the road in pixels.
     """
@@ -158,7 +160,9 @@ def _lens_drop(image: Image, spare: Image, x: float, y: float, radius: float) ->
 
 
 @compiled
-def veil(image: Image, nearness: Image, column: float, row: float, colour: tuple[float, float, float]) -> None:
+def veil(
+    image: Image, nearness: Image, column: float, row: float, colour: tuple[float, float, float]
+) -> None:
     """Light of a sun at (column, row) scattered in the lens, as far as the sky there is free."""
     height, width = nearness.shape
     free = 0.0

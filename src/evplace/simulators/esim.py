@@ -55,12 +55,18 @@ class SensorSettings:
     def __post_init__(self) -> None:
         for name in ("threshold_on", "threshold_off", "log_eps"):
             if not getattr(self, name) > 0:
-                raise SettingsError(f"the setting '{name}' cannot be {getattr(self, name)}: it must be above 0")
+                raise SettingsError(
+                    f"the setting '{name}' cannot be {getattr(self, name)}: it must be above 0"
+                )
         for name in ("threshold_spread", "refractory_us", "noise_hz", "leak_hz", "hot_pixels", "hot_hz"):
             if not getattr(self, name) >= 0:
-                raise SettingsError(f"the setting '{name}' cannot be {getattr(self, name)}: it must be 0 or more")
+                raise SettingsError(
+                    f"the setting '{name}' cannot be {getattr(self, name)}: it must be 0 or more"
+                )
         if self.hot_pixels > 1:
-            raise SettingsError(f"the setting 'hot_pixels' cannot be {self.hot_pixels}: it is a share, at most 1")
+            raise SettingsError(
+                f"the setting 'hot_pixels' cannot be {self.hot_pixels}: it is a share, at most 1"
+            )
 
 
 PRESETS: dict[str, SensorSettings] = {
@@ -189,7 +195,9 @@ class Simulator:
         if self._before is None:
             return
         if frame.dtype != self._before.dtype:
-            raise InputError(f"a frame of {frame.dtype} came after one of {self._before.dtype}: give one kind")
+            raise InputError(
+                f"a frame of {frame.dtype} came after one of {self._before.dtype}: give one kind"
+            )
         if t_us <= self._t_us:
             raise InputError(
                 f"a frame at {t_us} us came after one at {self._t_us} us: "
