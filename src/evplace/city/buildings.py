@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evplace.city.facades import SHOP
 from evplace.city.materials import FACADE, PLAIN, ROOF, SIGN
-from evplace.city.mesh import Mesh
+from evplace.city.mesh import Mesh, up
 from evplace.city.terrain import Terrain
 
 WALLS = np.array(
@@ -31,7 +31,7 @@ ROOFS = np.array([(0.30, 0.12, 0.08), (0.16, 0.15, 0.16), (0.24, 0.16, 0.12)])
 
 @dataclass(frozen=True)
 class Lot:
-    """A piece of ground on the drawing board, with the side (0 south, 1 east, 2 north, 3 west) of its street."""
+    """A piece of ground on the drawing board; its street is at `side`: 0 south, 1 east, 2 north, 3 west."""
 
     x0: float
     x1: float
@@ -79,7 +79,7 @@ def build_house(mesh: Mesh, terrain: Terrain, lot: Lot, usual: float, rng: np.ra
         rng,
     )
     if storeys <= 2 and rng.random() < 0.7:
-        _pitched_roof(mesh, feet + (0, 0, height), lot.side, rng)
+        _pitched_roof(mesh, feet + up(height), lot.side, rng)
     street = terrain.world(*np.mean([lot.corners[lot.side], lot.corners[(lot.side + 1) % 4]], axis=0))
     if shop:
         _hangings(mesh, feet, lot.side, float(street[2]), rng)
@@ -145,7 +145,7 @@ def _hangings(
     out = np.array([along[1], -along[0], 0.0])
     width = float(np.linalg.norm(b - a))
     if rng.random() < 0.7:
-        foot = (a + b) / 2 + along * rng.uniform(-0.4, 0.4) * width + (0, 0, rng.uniform(2.8, 4.2))
+        foot = (a + b) / 2 + along * rng.uniform(-0.4, 0.4) * width + up(rng.uniform(2.8, 4.2))
         size, tall = out * rng.uniform(0.6, 1.2), (0, 0, rng.uniform(0.6, 2.2))
         look = (
             *rng.uniform(0.1, 0.8, 3),
@@ -162,6 +162,6 @@ def _hangings(
         mesh.quad(foot + size, -size, tall, SIGN, look)
     if rng.random() < 0.4:
         reach, colour = rng.uniform(0.3, 0.45) * width, rng.uniform(0.1, 0.7, 3)
-        edge = (a + b) / 2 - along * reach + out * 1.2 + (0, 0, 2.4)
+        edge = (a + b) / 2 - along * reach + out * 1.2 + up(2.4)
         mesh.quad(edge, along * 2 * reach, (0, 0, 0.5) - out * 1.2, PLAIN, colour)
-        mesh.quad(edge - (0, 0, 0.3), along * 2 * reach, (0, 0, 0.3), PLAIN, colour * 0.7)
+        mesh.quad(edge - up(0.3), along * 2 * reach, (0, 0, 0.3), PLAIN, colour * 0.7)

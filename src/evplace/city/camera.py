@@ -11,7 +11,7 @@ from evplace.city.jit import compiled
 
 GREY = 0.20
 """Mean of the linear picture that the exposure aims at."""
-GAINS = (0.25, 6.0)
+GAINS = (0.25, 4.0)
 """Least and most gain; at night the most is not enough, so the picture stays dark and noisy."""
 ADAPTS_S = 0.6
 """Time constant of the exposure."""

@@ -125,7 +125,7 @@ def _timed(
             wait = signals.until_green(halt.crossing, halt.axis, times[k])
             stops.append((k, wait))
             times = _passing_times(limit, stops)
-    ways = np.arange(len(limit)) * STEP_M
+    ways = (np.arange(len(limit)) * STEP_M).astype(np.float64)
     for k, wait in reversed(stops):
         times = np.insert(times, k, times[k] - wait)
         ways = np.insert(ways, k, ways[k])

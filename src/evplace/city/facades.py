@@ -68,7 +68,7 @@ def _upper_floors(
     inside = band(v, fv, look[GROUND], look[HEIGHT] - CORNICE_M)
     across = pulse(column, fc, 0.5 - wide * 0.5, wide)
     pane = across * pulse(storey, fr, 0.5 - tall * 0.5, tall) * inside
-    i, j = int(math.floor(column)), int(math.floor(storey))
+    i, j = math.floor(column), math.floor(storey)
     if hash01(i, j, seed + 77) > 0.92:
         pane = 0.0  # bricked up
     style = int(look[STYLE])
@@ -123,7 +123,7 @@ def _shop(look: Look, u: float, v: float, fu: float, fv: float, light: Light, su
     seed, ground = int(look[SEED]), look[GROUND]
     front = look[WIDTH] / max(1.0, math.floor(look[WIDTH] / 5.5))
     x, fx = u / front, fu / front
-    i = int(math.floor(x))
+    i = math.floor(x)
     open_late, stocked = hash01(i, 1, seed + 3), hash01(i, 2, seed + 3)
     paint = _shop_colour(i, seed)
     pane = pulse(x, fx, 0.05, 0.62) * band(v, fv, 0.5, ground - 1.1)
@@ -186,6 +186,6 @@ def _house_door(
         0.1 + 0.4 * hash01(1, 4, seed + 4),
     )
     colour = mix(mix(colour, paint, door), (0.1, 0.1, 0.11), pane)
-    if light.night > 0.0 and hash01(int(math.floor(u / pitch)), 9, seed) < look[LIT]:
+    if light.night > 0.0 and hash01(math.floor(u / pitch), 9, seed) < look[LIT]:
         shine = plus(shine, scale((1.0, 0.8, 0.5), pane * light.windows))
     return colour, shine

@@ -132,8 +132,8 @@ class Film:
             end = count + len(part.shape)
             if end > len(self._scene.shape):
                 break
-            for whole, piece in zip(self._scene, part, strict=True):
-                whole[count:end] = piece
+            for name in Primitives._fields:
+                getattr(self._scene, name)[count:end] = getattr(part, name)
             count = end
         return count
 
@@ -167,8 +167,19 @@ class Film:
 
 def view_of(pose: Pose, focal: float, size: Size) -> View:
     """The pinhole camera at a pose."""
-    right, down, forward = (tuple(float(value) for value in row) for row in camera_axes(pose))
-    return View((float(pose.x), float(pose.y), float(pose.z)), right, down, forward, focal, *size)
+    right, down, forward = camera_axes(pose)
+    return View(
+        (float(pose.x), float(pose.y), float(pose.z)),
+        _three(right),
+        _three(down),
+        _three(forward),
+        focal,
+        *size,
+    )
+
+
+def _three(row: NDArray[np.float64]) -> tuple[float, float, float]:
+    return float(row[0]), float(row[1]), float(row[2])
 
 
 def _with_room(parts: Primitives, extra: int) -> Primitives:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.city.materials import FENCE, HALF_ROAD_M, LAMP, LEAVES, PLAIN, SIGN
-from evplace.city.mesh import OVAL, Mesh
+from evplace.city.mesh import OVAL, Mesh, up
 from evplace.city.streets import KERB_M, Streets
 from evplace.city.terrain import Terrain
 
@@ -61,7 +61,7 @@ class _Row:
         """World position on the pavement, and the world direction across the street to its middle."""
         x, y = self.point(along, off)
         across = (math.pi if off > 0 else 0.0) if self.along_y else (-math.pi / 2 if off > 0 else math.pi / 2)
-        return terrain.world(x, y) + (0, 0, KERB_M), terrain.heading(x, y, across)
+        return terrain.world(x, y, KERB_M), terrain.heading(x, y, across)
 
 
 def _lamp_row(
@@ -87,8 +87,8 @@ def _street_lamp(
     """A pole with an arm over the road; returns where its lamp is."""
     reach = np.array([math.cos(inward), math.sin(inward), 0.0])
     mesh.box(foot, (0.11, 0.11), 6.9, inward, PLAIN, POLE)
-    mesh.box(foot + reach * 0.8 + (0, 0, 6.9), (0.85, 0.1), 0.15, inward, PLAIN, POLE)
-    head = foot + reach * 1.5 + (0, 0, 6.8)
+    mesh.box(foot + reach * 0.8 + up(6.9), (0.85, 0.1), 0.15, inward, PLAIN, POLE)
+    head = foot + reach * 1.5 + up(6.8)
     mesh.box(head, (0.3, 0.24), 0.12, inward, LAMP, (*colour, 0.3, 25.0))
     x, y, z = (float(value) for value in head)
     side = np.array([-reach[1], reach[0], 0.0])
@@ -144,7 +144,7 @@ def _road_sign(mesh: Mesh, foot: NDArray[np.float64], inward: float, rng: np.ran
     wide = np.array([math.cos(inward), math.sin(inward), 0.0]) * 0.7
     look = (*rng.uniform(0.1, 0.8, 3), 0.05, 0, 0, 0, 0, 0, 0, int(rng.integers(30000)))
     for way in (-1, 1):
-        mesh.quad(foot + (0, 0, 1.96) - way * wide / 2, way * wide, (0, 0, 0.7), SIGN, look)
+        mesh.quad(foot + up(1.96) - way * wide / 2, way * wide, (0, 0, 0.7), SIGN, look)
 
 
 def _shelter(mesh: Mesh, foot: NDArray[np.float64], inward: float, rng: np.random.Generator) -> None:
@@ -174,19 +174,19 @@ def _traffic_lights(
                 right = np.array([ahead[1], -ahead[0]])
                 spot = np.array([x, y]) + (ahead + right) * (HALF_ROAD_M + 0.7)
                 heading = terrain.heading(spot[0], spot[1], k * math.pi / 2)
-                foot = terrain.world(spot[0], spot[1]) + (0, 0, KERB_M)
+                foot = terrain.world(spot[0], spot[1], KERB_M)
                 kept.signals.append((i, j, k % 2, *_signal(mesh, foot, heading)))
 
 
 def _signal(mesh: Mesh, foot: NDArray[np.float64], heading: float) -> tuple[int, int]:
     """A post with three lights that face a driver who goes `heading`; returns its red and its green."""
     mesh.box(foot, (0.08, 0.08), 3.0, heading, PLAIN, (0.2, 0.2, 0.1))
-    mesh.box(foot + (0, 0, 3.0), (0.16, 0.2), 1.1, heading, PLAIN, (0.03, 0.03, 0.03), top=PLAIN)
+    mesh.box(foot + up(3.0), (0.16, 0.2), 1.1, heading, PLAIN, (0.03, 0.03, 0.03), top=PLAIN)
     ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
     right = np.array([ahead[1], -ahead[0], 0.0])
     found = []
     for colour, rise in (((1.0, 0.10, 0.05), 3.76), ((1.0, 0.6, 0.05), 3.42), ((0.1, 1.0, 0.4), 3.08)):
         found.append(len(mesh))
-        corner = foot - ahead * 0.17 - right * 0.14 + (0, 0, rise)
+        corner = foot - ahead * 0.17 - right * 0.14 + up(rise)
         mesh.quad(corner, right * 0.28, (0, 0, 0.28), LAMP, (*colour, 0.05, 0.02), shape=OVAL)
     return found[0], found[2]

@@ -2,7 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeVar, cast
+
 from numba import njit
 
-compiled = njit(cache=True, error_model="numpy")
-"""Decorator of every hot loop of the city (dividing by zero gives infinity, as in numpy)."""
+Loop = TypeVar("Loop", bound=Callable[..., object])
+
+
+def compiled(loop: Loop) -> Loop:
+    """Decorator of every hot loop of the city; dividing by zero gives infinity, as in numpy."""
+    return cast(Loop, njit(cache=True, error_model="numpy")(loop))

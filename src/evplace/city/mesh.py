@@ -71,7 +71,7 @@ class Mesh:
 
     def box(
         self,
-        centre: Sequence[float],
+        centre: ArrayLike,
         half: tuple[float, float],
         height: float,
         angle: float,
@@ -85,7 +85,7 @@ class Mesh:
         for k in range(4):
             self.quad(corners[k], corners[(k + 1) % 4] - corners[k], (0, 0, height), material, look)
         if top is not None:
-            lid = corners[0] + (0, 0, height)
+            lid = corners[0] + up(height)
             self.quad(lid, corners[1] - corners[0], corners[3] - corners[0], top, look)
 
     def primitives(self) -> Primitives:
@@ -113,7 +113,12 @@ class Mesh:
 _FIELDS = (((9,), float), ((), np.int32), ((2,), float), ((), np.int32), ((3,), float), ((LOOKS,), float))
 
 
-def box_corners(centre: Sequence[float], half: tuple[float, float], angle: float) -> Vector:
+def up(metres: float) -> Vector:
+    """The upright vector of that length."""
+    return np.array([0.0, 0.0, metres])
+
+
+def box_corners(centre: ArrayLike, half: tuple[float, float], angle: float) -> Vector:
     """(4, 3) floor corners of a turned box, counter-clockwise from back right."""
     c, s = math.cos(angle), math.sin(angle)
     ahead = np.array([c, s, 0.0]) * half[0]

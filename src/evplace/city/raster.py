@@ -191,8 +191,8 @@ def _fill(
 ) -> None:
     """Each row's span of one primitive; the nearest wins."""
     a, b, c = plane
-    first = max(0, int(math.floor(box[2] - 0.5)))
-    last = min(2 * view.height - 1, int(math.ceil(box[3] + 0.5)))
+    first = max(0, math.floor(box[2] - 0.5))
+    last = min(2 * view.height - 1, math.ceil(box[3] + 0.5))
     left, right = max(0.0, box[0] - 1.0), min(2.0 * view.width - 1.0, box[1] + 1.0)
     for row in range(first, last + 1):
         offset = sample_offset(row)
@@ -203,7 +203,7 @@ def _fill(
         span = _cut(span, c[0] - b[0], w - t)
         span = _cut(span, a[0] - taper[0] * b[0], s - taper[0] * t)
         span = _cut(span, c[0] - a[0] - taper[1] * b[0], w - s - taper[1] * t)
-        for x in range(int(math.ceil(span[0])), int(math.floor(span[1])) + 1):
+        for x in range(math.ceil(span[0]), math.floor(span[1]) + 1):
             near = w + c[0] * x
             if np.float32(near) > nearness[row, x]:
                 i = s + a[0] * x - 0.5 * near

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +17,23 @@ Node = tuple[int, int]
 
 PATHS: dict[int, list[Node]] = {
     1: [(0, 1), (3, 1), (3, 3), (5, 3), (5, 1), (6, 1), (6, 5), (3, 5), (3, 4), (1, 4), (1, 6)],
-    2: [(0, 0), (1, 0), (1, 1), (3, 1), (3, 3), (5, 3), (5, 2), (6, 2), (6, 4), (4, 4), (4, 5), (3, 5)]
-    + [(3, 4), (2, 4), (2, 6)],
+    2: [
+        (0, 0),
+        (1, 0),
+        (1, 1),
+        (3, 1),
+        (3, 3),
+        (5, 3),
+        (5, 2),
+        (6, 2),
+        (6, 4),
+        (4, 4),
+        (4, 5),
+        (3, 5),
+        (3, 4),
+        (2, 4),
+        (2, 6),
+    ],
 }
 """The two paths; about 60 per cent of path 2 runs along path 1."""
 LANE_M = {1: 1.9, 2: 1.3}
@@ -130,7 +146,7 @@ def _halts(
 ) -> list[Halt]:
     """Where the car would wait before each crossing on its way."""
     halts = []
-    for (i, j), (k, m) in zip(nodes, nodes[1:], strict=False):
+    for (i, j), (k, m) in itertools.pairwise(nodes):
         ahead = np.sign([k - i, m - j])
         right = np.array([ahead[1], -ahead[0]])
         for step in range(1, max(abs(k - i), abs(m - j)) + 1):

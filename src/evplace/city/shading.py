@@ -209,7 +209,7 @@ def _material(kind: int, look: Look, spot: Spot, light: Light) -> tuple[Colour, 
         colour = materials.roof(look, spot.t, spot.ft)
     elif kind == GLASS:
         colour, shine = materials.glass(look, spot.t, light)
-    if kind == ROAD or kind == PAVEMENT:
+    if kind in (ROAD, PAVEMENT):
         return scale(colour, 1.0 - 0.45 * light.wet), shine
     if light.snow > 0.0:
         colour = mix(colour, materials.WHITE, light.snow * smoothstep(0.2, 0.8, spot.normal[2]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +42,7 @@ class Streets:
 
 def _gaps(axis: NDArray[np.float64]) -> list[tuple[float, float]]:
     edges = [axis[0] - EDGE_M, *axis, axis[-1] + EDGE_M]
-    return [(a + HALF_ROAD_M, b - HALF_ROAD_M) for a, b in zip(edges, edges[1:], strict=False)]
+    return [(a + HALF_ROAD_M, b - HALF_ROAD_M) for a, b in itertools.pairwise(edges)]
 
 
 def pave(
@@ -54,8 +55,8 @@ def pave(
     """Cover the board with tiles; `courts` gives the colour inside block (column, row)."""
     lines_x, lines_y = (_lines(axis) for axis in (streets.x, streets.y))
     styles_x, styles_y = rng.random(len(streets.x)), rng.random(len(streets.y))
-    for x0, x1 in zip(lines_x, lines_x[1:], strict=False):
-        for y0, y1 in zip(lines_y, lines_y[1:], strict=False):
+    for x0, x1 in itertools.pairwise(lines_x):
+        for y0, y1 in itertools.pairwise(lines_y):
             i, off_x = _nearest(streets.x, (x0 + x1) / 2)
             j, off_y = _nearest(streets.y, (y0 + y1) / 2)
             tail = (x0, y0, x1 - x0, y1 - y0, streets.x[i], streets.y[j], styles_x[i], styles_y[j])
@@ -65,11 +66,9 @@ def pave(
             elif min(off_x, off_y) < HALF_ROAD_M + PAVEMENT_M:
                 _tile(mesh, terrain, tile, KERB_M, PAVEMENT, (0.30, 0.295, 0.285, *tail))
             else:
-                block = tuple(
-                    int(np.searchsorted(axis, (a + b) / 2))
-                    for axis, a, b in ((streets.x, x0, x1), (streets.y, y0, y1))
-                )
-                _tile(mesh, terrain, tile, KERB_M, PLAIN, courts[block])
+                column = int(np.searchsorted(streets.x, (x0 + x1) / 2))
+                row = int(np.searchsorted(streets.y, (y0 + y1) / 2))
+                _tile(mesh, terrain, tile, KERB_M, PLAIN, courts[column, row])
     for block_edges in streets.blocks():
         _kerbs(mesh, terrain, block_edges, lines_x, lines_y)
 
@@ -95,7 +94,7 @@ def close_vistas(mesh: Mesh, streets: Streets, terrain: Terrain, rng: np.random.
                     0.5,
                     0.55,
                     3.8,
-                    rng.integers(1, 30000),
+                    int(rng.integers(1, 30000)),
                     2,
                     0.6,
                     0.3,
@@ -128,7 +127,7 @@ def _tile(
     look: tuple[float, ...],
 ) -> None:
     x0, x1, y0, y1 = tile
-    corner, right, up = terrain.world([x0, x1, x0], [y0, y0, y1]) + (0, 0, lift)
+    corner, right, up = terrain.world([x0, x1, x0], [y0, y0, y1], lift)
     mesh.quad(corner, right - corner, up - corner, material, look)
 
 
@@ -150,6 +149,6 @@ def _kerbs(
         + [(x0, y) for y in ys[::-1]]
     )
     feet = terrain.world([x for x, _ in ring], [y for _, y in ring])
-    for a, b in zip(feet, feet[1:], strict=False):
+    for a, b in itertools.pairwise(feet):
         if np.hypot(*(b - a)[:2]) > 0.1:
             mesh.quad(a, b - a, (0, 0, KERB_M), PLAIN, (0.33, 0.33, 0.33))

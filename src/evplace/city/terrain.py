@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Points = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ class Wave:
     phase: float
 
     def __call__(self, u: Points | float) -> Points:
+        """The value at `u`."""
         return np.asarray(self.amplitude * np.sin(2 * math.pi * np.asarray(u) / self.length + self.phase))
 
     def slope(self, u: Points | float) -> Points:
@@ -52,10 +53,10 @@ class Terrain:
             Wave(rng.uniform(1.5, 2.5), rng.uniform(230, 300), rng.uniform(0, turn)),
         )
 
-    def world(self, x: Points | float, y: Points | float) -> Points:
-        """(..., 3) world positions of the ground at drawing-board positions, metres."""
-        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
-        return np.stack([x + self.east(y), y + self.north(x), self.hill_x(x) + self.hill_y(y)], -1)
+    def world(self, x: ArrayLike, y: ArrayLike, lift: float = 0.0) -> Points:
+        """(..., 3) world positions, `lift` metres above the ground at drawing-board positions."""
+        u, v = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        return np.stack([u + self.east(v), v + self.north(u), self.hill_x(u) + self.hill_y(v) + lift], -1)
 
     def heading(self, x: float, y: float, angle: float) -> float:
         """The world direction of a drawing-board direction at a point, radians."""

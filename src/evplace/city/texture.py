@@ -108,4 +108,4 @@ def sample(grid: np.ndarray, x: float, y: float) -> float:
     v = y - j
     low = grid[j, i] * (1.0 - u) + grid[j, i + 1] * u
     high = grid[j + 1, i] * (1.0 - u) + grid[j + 1, i + 1] * u
-    return low * (1.0 - v) + high * v
+    return float(low * (1.0 - v) + high * v)

@@ -78,9 +78,9 @@ def _park(mesh: Mesh, terrain: Terrain, block: Block, kept: Furniture, rng: np.r
     """Trees behind a low hedge."""
     x0, x1, y0, y1 = block
     for _ in range(26):
-        foot = terrain.world(rng.uniform(x0 + 1, x1 - 1), rng.uniform(y0 + 1, y1 - 1)) + (0, 0, KERB_M)
+        foot = terrain.world(rng.uniform(x0 + 1, x1 - 1), rng.uniform(y0 + 1, y1 - 1), KERB_M)
         plant(mesh, foot, rng, rng.uniform(0.8, 1.5), kept)
-    hedge(mesh, terrain.world([x0, x1, x1, x0], [y0, y0, y1, y1]) + (0, 0, KERB_M), rng)
+    hedge(mesh, terrain.world([x0, x1, x1, x0], [y0, y0, y1, y1], KERB_M), rng)
 
 
 def _houses(
@@ -123,7 +123,8 @@ def _lots(block: Block, rng: np.random.Generator) -> list[Lot]:
 
 def _garden(mesh: Mesh, terrain: Terrain, lot: Lot, kept: Furniture, rng: np.random.Generator) -> None:
     """An empty lot: a hedge or fence and three trees."""
-    hedge(mesh, terrain.world(*np.transpose(lot.corners)) + (0, 0, KERB_M), rng)
+    x, y = np.transpose(lot.corners)
+    hedge(mesh, terrain.world(x, y, KERB_M), rng)
     for _ in range(3):
         x, y = rng.uniform((lot.x0 + 1, lot.y0 + 1), (lot.x1 - 1, lot.y1 - 1))
-        plant(mesh, terrain.world(x, y) + (0, 0, KERB_M), rng, rng.uniform(0.8, 1.3), kept)
+        plant(mesh, terrain.world(x, y, KERB_M), rng, rng.uniform(0.8, 1.3), kept)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from evplace.city.drive import Drive, Pose
 from evplace.city.figures import STRIDES, car, person
-from evplace.city.mesh import Mesh, Primitives, join, placed
+from evplace.city.mesh import Mesh, Primitives, join, placed, up
 from evplace.city.routes import STEP_M, Halt, Route
 from evplace.city.signals import CYCLE_S, RED_S, Signals
 from evplace.city.streets import KERB_M
@@ -71,7 +71,7 @@ class Traffic:
             position, yaw = self._beside(ways[k], self.walkers[k, 1])
             stride = int(seconds * 1.9 * STRIDES + k) % STRIDES
             figure = _person(int(self.walkers[k, 3]), stride)
-            yield placed(figure, position + (0, 0, KERB_M), yaw if speed[k] > 0 else yaw + math.pi)
+            yield placed(figure, position + up(KERB_M), yaw if speed[k] > 0 else yaw + math.pi)
 
     def _crossing(self, pose: Pose, seconds: float) -> Iterator[Primitives]:
         """Cars on the street across, while the car's own light is red."""

@@ -22,8 +22,6 @@ def warm(settings: CitySettings) -> None:
         for t_us in (0, 100_000):
             radiance = film.radiance(t_us)
             camera.expose(radiance, t_us)
-            for sensor, frame in zip(
-                sensors, (luminance(radiance), grey(camera.picture(radiance))), strict=True
-            ):
-                imager.add(sensor.push(frame, t_us))
+            imager.add(sensors[0].push(luminance(radiance), t_us))
+            imager.add(sensors[1].push(grey(camera.picture(radiance)), t_us))
             imager.image(t_us)

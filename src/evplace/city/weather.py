@@ -113,7 +113,7 @@ def _streak(
     steps = int(length) + 1
     for k in range(steps + 1):
         x = ax + (bx - ax) * k / steps - 0.5
-        column, row = int(math.floor(x)), int(math.floor(ay + (by - ay) * k / steps))
+        column, row = math.floor(x), math.floor(ay + (by - ay) * k / steps)
         if 0 <= column < width - 1 and 0 <= row < height:
             _blend(image, row, column, opacity * (1.0 - x + column), white)
             _blend(image, row, column + 1, opacity * (x - column), white)
@@ -138,7 +138,7 @@ def lens_drops(image: Image, spare: Image, seconds: float, count: int) -> None:
     for i in range(count):
         cycle = 6.0 + 5.0 * hash01(i, 0, 9)
         phase = hash01(i, 1, 9) * cycle
-        turn = int(math.floor((seconds + phase) / cycle))
+        turn = math.floor((seconds + phase) / cycle)
         age = seconds + phase - turn * cycle
         x = hash01(i, turn, 10) * width
         y = hash01(i, turn, 11) * height + age * age * 0.002 * height

@@ -11,6 +11,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -19,8 +20,10 @@ from numpy.typing import NDArray
 from evplace.errors import InputError, SettingsError
 from evplace.events import Events, Size
 
-Frame = NDArray[np.uint8] | NDArray[np.float32] | NDArray[np.float64]
+Frame = NDArray[Any]
 """(H, W) 8-bit grey, or linear light as floats."""
+
+LogLight = NDArray[np.float32]
 
 TOO_FAST = 1.0
 """Motion in pixels between two frames above which crossings are no longer known well."""
@@ -44,7 +47,8 @@ class SensorSettings:
     refractory_us: int = 500
     """Microseconds after an event in which the pixel gives none."""
     noise_hz: float = 0.1
-    """Background events per pixel and second, of either sign, at times of their own."""
+    """Background events per second of a pixel in the dark, of either sign. In light they are fewer by
+    eps / (eps + light): shot noise matters less the more light there is (ours)."""
     leak_hz: float = 0.0
     """ON events per second of a pixel that sees no change (v2e, Hu et al. 2021: about 0.1)."""
     hot_pixels: float = 0.0
@@ -117,22 +121,21 @@ class Simulator:
             self._level[:] = log_light(frame, self._table, self.settings.log_eps)
             events = Events.empty(self.size)
         else:
-            events = self._between(frame, t_us)
+            events = self._between(self._before, frame, t_us)
         self._before, self._t_us = np.array(frame, copy=True), t_us
         return events
 
-    def _between(self, frame: Frame, t_us: int) -> Events:
+    def _between(self, before: Frame, frame: Frame, t_us: int) -> Events:
         leak = self.settings.leak_hz * self.settings.threshold_on * (t_us - self._t_us) * 1e-6
-        count = self._cross(frame, t_us, leak)
+        old, new = (log_light(image, self._table, self.settings.log_eps) for image in (before, frame))
+        count = self._cross(old, new, t_us, leak)
         if leak:
             self._level -= np.float32(leak)
-        count += self._add_noise(count, t_us)
+        count += self._add_noise(new, count, t_us)
         return self._room.sorted(count, self._t_us, t_us, self.size)
 
-    def _cross(self, frame: Frame, t_us: int, leak: float) -> int:
+    def _cross(self, old: LogLight, new: LogLight, t_us: int, leak: float) -> int:
         """Fill the room with the crossings of one interval; more room is made where it does not do."""
-        assert self._before is not None
-        old, new = (log_light(image, self._table, self.settings.log_eps) for image in (self._before, frame))
         at, count = 0, 0
         while True:
             at, count = _crossings(
@@ -150,23 +153,25 @@ class Simulator:
                 count,
                 *self._room.arrays,
             )
-            if at == frame.size:
-                return count
+            if at == new.size:
+                return int(count)
             self._room.grow()
 
-    def _add_noise(self, count: int, t_us: int) -> int:
+    def _add_noise(self, new: LogLight, count: int, t_us: int) -> int:
         """Events without cause, evenly in the interval; returns how many."""
         seconds = (t_us - self._t_us) * 1e-6
         pixels = self._level.size
         hot = len(self._hot)
         numbers = [self.settings.noise_hz * pixels * seconds, self.settings.hot_hz * hot * seconds]
         background, fired = (int(self._rng.poisson(mean)) if mean > 0 else 0 for mean in numbers)
-        total = background + fired
-        if not total:
-            return 0
         where = self._rng.integers(0, pixels, background)
+        dark = self.settings.log_eps / np.exp(new.ravel()[where])
+        where = where[self._rng.random(background) < dark]
         if fired:
             where = np.concatenate([where, self._hot[self._rng.integers(0, hot, fired)]])
+        total = len(where)
+        if not total:
+            return 0
         self._room.put(
             count,
             self._rng.integers(0, t_us - self._t_us, total),
@@ -240,8 +245,8 @@ class _Room:
         """The first `count` events in the order of time; those of one microsecond stay in their order."""
         span = end_us - start_us
         if span < _BUCKETS:
-            columns = _counted(span, count, start_us, *self.arrays)
-            return Events(*columns, size)
+            t_us, x, y, p = _counted(span, count, start_us, *self.arrays)
+            return Events(t_us, x, y, p, size)
         order = np.argsort(self._dt[:count], kind="stable")
         t_us = start_us + self._dt[:count][order]
         return Events(t_us, self._x[order], self._y[order], self._p[order], size)
