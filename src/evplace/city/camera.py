@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evplace.city.jit import compiled
 
-GREY = 0.20
+GREY = 0.24
 """Mean of the linear picture that the exposure aims at."""
 GAINS = (0.25, 4.0)
 """Least and most gain; at night the most is not enough, so the picture stays dark and noisy."""

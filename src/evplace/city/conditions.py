@@ -116,7 +116,7 @@ CONDITIONS = {
     ),
     "lowsun": Condition(
         sun=(3.2, 2.3, 1.35),
-        towards_sun=(0.62, 0.70, 0.20),
+        towards_sun=(0.98, 0.14, 0.17),
         ambient=(0.42, 0.48, 0.62),
         zenith=(0.30, 0.48, 0.95),
         horizon=(1.30, 1.12, 0.90),

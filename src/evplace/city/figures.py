@@ -78,22 +78,19 @@ def _cabin(
     rear, front = ends
     length, tall, width, inset = front - rear, roof - belt, 0.80, 0.12
     back, ahead = lean[0] / length, lean[1] / length
+    screens, sides = (*WINDOW, 0, 0, *paint, 0.0), (*WINDOW, 0, 0, *paint, 1.0)
     up_right, up_left = (0, inset, tall), (0, -inset, tall)
-    mesh.quad((rear, -width, belt), (length, 0, 0), up_right, GLASS, WINDOW, taper=(back, ahead))
-    mesh.quad((front, width, belt), (-length, 0, 0), up_left, GLASS, WINDOW, taper=(ahead, back))
+    mesh.quad((rear, -width, belt), (length, 0, 0), up_right, GLASS, sides, taper=(back, ahead))
+    mesh.quad((front, width, belt), (-length, 0, 0), up_left, GLASS, sides, taper=(ahead, back))
     narrow = inset / (2 * width)
     wide = (0, 2 * width, 0)
-    mesh.quad((front, -width, belt), wide, (-lean[1], 0, tall), GLASS, WINDOW, taper=(narrow, narrow))
+    mesh.quad((front, -width, belt), wide, (-lean[1], 0, tall), GLASS, screens, taper=(narrow, narrow))
     mesh.quad(
-        (rear, width, belt), (0, -2 * width, 0), (lean[0], 0, tall), GLASS, WINDOW, taper=(narrow, narrow)
+        (rear, width, belt), (0, -2 * width, 0), (lean[0], 0, tall), GLASS, screens, taper=(narrow, narrow)
     )
     flat = length - lean[0] - lean[1]
     top = (rear + lean[0], -width + inset, roof)
     mesh.quad(top, (flat, 0, 0), (0, 2 * (width - inset), 0), PLAIN, paint)
-    for side in (-1.0, 1.0):  # the painted edge of the roof, which outlines the windows
-        edge = (flat * -side, 0, 0)
-        start = (rear + lean[0] if side < 0 else front - lean[1], side * (width - inset + 0.005), roof - 0.09)
-        mesh.quad(start, edge, (0, 0, 0.1), PLAIN, paint)
 
 
 def _wheel(mesh: Mesh, x: float, y: float, side: float) -> None:

@@ -127,9 +127,9 @@ def plant(
     green = np.array([0.10, 0.19, 0.05]) * rng.uniform(0.7, 1.3) + np.array([0.06, 0, 0]) * rng.random()
     mesh.box(foot, (0.14 * size, 0.14 * size), trunk + 0.8 * size, rng.random(), PLAIN, (0.13, 0.09, 0.06))
     if kind < 0.6:
-        tufts = [(rng.normal(0, 0.85, 2), rng.uniform(0.2, 2.6), rng.uniform(0.45, 1.0)) for _ in range(12)]
+        tufts = [(rng.normal(0, 0.85, 2), rng.uniform(0.2, 2.6), rng.uniform(0.35, 0.8)) for _ in range(20)]
     elif kind < 0.85:
-        tufts = [(rng.normal(0, 0.2, 2), 0.45 * k, rng.uniform(0.5, 0.8)) for k in range(9)]
+        tufts = [(rng.normal(0, 0.2, 2), 0.45 * k, rng.uniform(0.45, 0.7)) for k in range(9)]
     else:
         tufts = [(rng.normal(0, 0.06, 2), 0.42 * k - 0.9, 1.15 - 0.12 * k) for k in range(9)]
     for off, rise, radius in tufts:

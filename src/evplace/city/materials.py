@@ -170,7 +170,11 @@ def roof(look: Look, t: float, ft: float) -> Colour:
 
 
 @compiled
-def glass(look: Look, t: float, light: Light) -> Surface:
-    """A car's window: dark, with the sky mirrored in its upper part."""
-    mirrored = scale(light.horizon, 0.06 + 0.22 * t)
-    return colour_of(look), mirrored
+def glass(look: Look, s: float, t: float, fs: float, ft: float, light: Light) -> Surface:
+    """A car's windows: dark, with the sky mirrored in their upper part. Look: 5-7 the paint of the posts,
+    8 whether there is one in the middle.
+    """
+    clear = band(s, fs, 0.05, 0.95) * band(t, ft, 0.0, 0.86)
+    clear *= 1.0 - look[8] * band(s, fs, 0.47, 0.53)
+    paint = (look[5], look[6], look[7])
+    return mix(paint, colour_of(look), clear), scale(light.horizon, clear * (0.03 + 0.12 * t))

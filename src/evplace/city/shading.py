@@ -208,7 +208,7 @@ def _material(kind: int, look: Look, spot: Spot, light: Light) -> tuple[Colour, 
     elif kind == ROOF:
         colour = materials.roof(look, spot.t, spot.ft)
     elif kind == GLASS:
-        colour, shine = materials.glass(look, spot.t, light)
+        colour, shine = materials.glass(look, spot.s, spot.t, spot.fs, spot.ft, light)
     if kind in (ROAD, PAVEMENT):
         return scale(colour, 1.0 - 0.45 * light.wet), shine
     if light.snow > 0.0:
