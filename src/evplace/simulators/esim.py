@@ -103,8 +103,8 @@ class Simulator:
         self._hot = self._hot_pixels(own)
         self._rng = np.random.default_rng([seed, 1, drive])
         shape = (size[1], size[0])
-        self._level = np.zeros(shape, np.float32)
-        self._before: Frame | None = None
+        self._kind: np.dtype[Any] | None = None
+        self._light = self._level = np.zeros(shape, np.float32)
         self._fired_us = np.full(shape, np.iinfo(np.int64).min // 2, np.int64)
         self._table = log_table(self.settings.log_eps)
         self._t_us = 0
@@ -117,29 +117,29 @@ class Simulator:
         first's, or its time is not later.
         """
         self._check(frame, t_us)
-        if self._before is None:
-            self._level[:] = log_light(frame, self._table, self.settings.log_eps)
+        light = log_light(frame, self._table, self.settings.log_eps)
+        if self._kind is None:
+            self._kind, self._level = frame.dtype, light.copy()
             events = Events.empty(self.size)
         else:
-            events = self._between(self._before, frame, t_us)
-        self._before, self._t_us = np.array(frame, copy=True), t_us
+            events = self._between(light, t_us)
+        self._light, self._t_us = light, t_us
         return events
 
-    def _between(self, before: Frame, frame: Frame, t_us: int) -> Events:
+    def _between(self, new: LogLight, t_us: int) -> Events:
         leak = self.settings.leak_hz * self.settings.threshold_on * (t_us - self._t_us) * 1e-6
-        old, new = (log_light(image, self._table, self.settings.log_eps) for image in (before, frame))
-        count = self._cross(old, new, t_us, leak)
+        count = self._cross(new, t_us, leak)
         if leak:
             self._level -= np.float32(leak)
         count += self._add_noise(new, count, t_us)
         return self._room.sorted(count, self._t_us, t_us, self.size)
 
-    def _cross(self, old: LogLight, new: LogLight, t_us: int, leak: float) -> int:
+    def _cross(self, new: LogLight, t_us: int, leak: float) -> int:
         """Fill the room with the crossings of one interval; more room is made where it does not do."""
         at, count = 0, 0
         while True:
             at, count = _crossings(
-                old,
+                self._light,
                 new,
                 np.float32(leak),
                 self._level,
@@ -197,12 +197,10 @@ class Simulator:
                 f"a frame of {shape} came to a sensor of {self.size[0]}x{self.size[1]}: "
                 f"all frames must be grey and of one size"
             )
-        if self._before is None:
+        if self._kind is None:
             return
-        if frame.dtype != self._before.dtype:
-            raise InputError(
-                f"a frame of {frame.dtype} came after one of {self._before.dtype}: give one kind"
-            )
+        if frame.dtype != self._kind:
+            raise InputError(f"a frame of {frame.dtype} came after one of {self._kind}: give one kind")
         if t_us <= self._t_us:
             raise InputError(
                 f"a frame at {t_us} us came after one at {self._t_us} us: "
@@ -354,12 +352,21 @@ def log_table(eps: float) -> NDArray[np.float32]:
 def log_light(frame: Frame, table: NDArray[np.float32], eps: float) -> NDArray[np.float32]:
     """(H, W) logarithm of a frame, by table for 8 bits."""
     if frame.dtype == np.uint8:
-        return np.asarray(table[frame])
+        return np.asarray(_looked_up(frame, table))
     return np.asarray(np.log(frame.astype(np.float32) + np.float32(eps)))
 
 
 def _means(settings: SensorSettings) -> tuple[float, float]:
     return settings.threshold_on, settings.threshold_off
+
+
+@njit(cache=True)
+def _looked_up(frame: NDArray[np.uint8], table: NDArray[np.float32]) -> LogLight:
+    out = np.empty(frame.shape, np.float32)
+    for y in range(frame.shape[0]):
+        for x in range(frame.shape[1]):
+            out[y, x] = table[frame[y, x]]
+    return out
 
 
 @njit(cache=True)
@@ -386,32 +393,32 @@ def _crossings(
     Returns the next pixel and the number of events. The leak lifts the signal in the interval; the caller
     lowers the level by as much afterwards, which is the same.
     """
-    width = old.shape[1]
-    a, b, reference = old.ravel(), new.ravel(), level.ravel()
-    fired, rise, drop = fired_us.ravel(), on.ravel(), off.ravel()
+    height, width = old.shape
     span = end_us - start_us
-    for i in range(first, a.size):
-        end = b[i] + leak
-        base = reference[i]
-        up = end > base
-        step = rise[i] if up else -drop[i]
-        after = base + step
-        if (after > end) if up else (after < end):
-            continue
-        if count + int((end - base) / step) + 2 > len(dt):
-            return i, count
-        change = float(end) - float(a[i])
-        while (after <= end) if up else (after >= end):
-            share = (float(after) - float(a[i])) / change if change != 0.0 else 0.0
-            late = int(min(max(share, 0.0), 1.0) * span)
-            base = after
+    for y in range(first // width, height):
+        for x in range(first % width if y == first // width else 0, width):
+            end = new[y, x] + leak
+            base = level[y, x]
+            move = end - base
+            if -off[y, x] < move < on[y, x]:
+                continue
+            up = move > 0
+            step = on[y, x] if up else -off[y, x]
+            if count + int(move / step) + 2 > len(dt):
+                return y * width + x, count
+            start = float(old[y, x])
+            pace = span / (float(end) - start) if end != old[y, x] else 0.0
             after = base + step
-            if start_us + late - fired[i] >= refractory_us:
-                fired[i] = start_us + late
-                dt[count], xs[count], ys[count], ps[count] = late, i % width, i // width, up
-                count += 1
-        reference[i] = base
-    return a.size, count
+            while (after <= end) if up else (after >= end):
+                late = int(min(max((float(after) - start) * pace, 0.0), span))
+                base = after
+                after = base + step
+                if start_us + late - fired_us[y, x] >= refractory_us:
+                    fired_us[y, x] = start_us + late
+                    dt[count], xs[count], ys[count], ps[count] = late, x, y, up
+                    count += 1
+            level[y, x] = base
+    return height * width, count
 
 
 @njit(cache=True)
