@@ -116,6 +116,13 @@ class GrowingArray:
         self._file.write(array.tobytes())
         self._length += 1
 
+    def extend(self, items: NDArray[Any]) -> None:
+        """Add many items at once."""
+        array = np.ascontiguousarray(items, self._dtype)
+        assert array.shape[1:] == self._item_shape, (array.shape, self._item_shape)
+        self._file.write(array.tobytes())
+        self._length += len(array)
+
     def close(self) -> None:
         """Write the final length into the header; numpy leaves room in it for that."""
         self._file.seek(0)

@@ -1,1 +1,28 @@
-"""city."""
+"""The virtual city: a data set that needs no download.
+
+A town of one seed, driven along two overlapping paths under seven conditions, rendered as linear light with
+exact poses and turned into events. The condition, the traffic and the driver's small habits are all that
+changes from one drive to the next. `city-v1` is frozen: its settings were set by eye, before any
+recognition was measured on it.
+"""
+
+from __future__ import annotations
+
+from evplace.city.conditions import CONDITIONS
+from evplace.city.film import CityFrame, Film, GeoPose
+from evplace.city.generation import Progress, generate
+from evplace.city.plan import VERSION, CitySettings
+from evplace.city.town import Town, build_town
+
+__all__ = [
+    "CONDITIONS",
+    "VERSION",
+    "CityFrame",
+    "CitySettings",
+    "Film",
+    "GeoPose",
+    "Progress",
+    "Town",
+    "build_town",
+    "generate",
+]

@@ -1,0 +1,183 @@
+"""All drives of a set, several at a time, resumable: a drive that is whole is not made again."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from threading import Lock
+from typing import NamedTuple
+
+import evplace
+from evplace import errors
+from evplace.city.plan import VERSION, CitySettings, drive_name
+from evplace.city.recording import record_drive
+from evplace.city.town import build_town
+from evplace.errors import EvplaceError, OutputError
+from evplace.settings import to_dict
+from evplace.storage import read_json, write_json
+
+SETTINGS_FILE = "city.json"
+
+
+class Progress(NamedTuple):
+    """How far a set of drives is."""
+
+    drive: str
+    """The drive that just moved on: day-1."""
+    share: float
+    """Of everything that is to be done now, 0 to 1."""
+    left_s: float
+    """Seconds until the end, guessed from the pace so far."""
+
+
+Report = Callable[[Progress], None]
+
+
+def generate(
+    out: str | Path,
+    settings: CitySettings | None = None,
+    workers: int | None = None,
+    progress: Report | None = None,
+) -> list[Path]:
+    """Make every drive of `settings` under `out`; returns their folders, `<condition>-<path>`.
+
+    Each holds a traverse for each sensor, the traverse `colour` (same times, same truth), and poses.npy
+    (n, 6): easting, northing, height in metres, yaw, pitch, roll in radians. `workers` processes are used
+    (None: one a core); the result does not depend on them. A drive that is there already is kept, so that a
+    killed call goes on where it was.
+
+    Raises OutputError where `out` was made with other settings, is being written, or the disk is full.
+    """
+    folder, chosen = Path(out), settings or CitySettings()
+    _claim(folder, chosen)
+    names = [drive_name(name, path) for name, path in chosen.drives()]
+    todo = [pair for pair, name in zip(chosen.drives(), names, strict=True) if not (folder / name).is_dir()]
+    meter = _Meter([drive_name(*pair) for pair in todo], progress)
+    count = min(workers or os.cpu_count() or 1, len(todo))
+    if count > 1:
+        _in_processes(folder, chosen, todo, count, meter)
+    elif todo:
+        town = build_town(chosen.seed)
+        for name, path in todo:
+            record_drive(folder, town, chosen, name, path, meter.of(drive_name(name, path)))
+            meter.of(drive_name(name, path))(1.0)
+    return [folder / name for name in names]
+
+
+def _claim(folder: Path, settings: CitySettings) -> None:
+    """Leave the settings in a new folder; refuse one that was made with others."""
+    wanted = {"version": VERSION, **settings.of_drive()}
+    file = folder / SETTINGS_FILE
+    if file.exists():
+        found = read_json(file, "the settings of a city")
+        other = [key for key in sorted(wanted | found) if wanted.get(key) != found.get(key)]
+        if other:
+            told = ", ".join(f"{key} {found.get(key)} (now {wanted.get(key)})" for key in other)
+            raise OutputError(
+                f"{folder} holds drives made with other settings: {told}; choose another folder"
+            )
+        return
+    if folder.exists() and any(folder.iterdir()):
+        raise OutputError(f"{folder} is not empty and holds no drives: choose another folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_json(file, wanted)
+    except OSError as error:
+        raise OutputError(f"cannot write {folder}: {error.strerror or error}") from error
+
+
+class _Meter:
+    """Puts the shares of all drives together."""
+
+    def __init__(self, names: list[str], report: Report | None) -> None:
+        self._shares = dict.fromkeys(names, 0.0)
+        self._report, self._lock, self._began = report, Lock(), time.monotonic()
+
+    def of(self, name: str) -> Callable[[float], None]:
+        """What one drive tells its share to."""
+
+        def tell(share: float) -> None:
+            with self._lock:
+                self._shares[name] = share
+                total = sum(self._shares.values()) / len(self._shares)
+                elapsed = time.monotonic() - self._began
+                if self._report is not None and total > 0:
+                    self._report(Progress(name, total, elapsed * (1 - total) / total))
+
+        return tell
+
+
+def _in_processes(
+    folder: Path, settings: CitySettings, todo: list[tuple[str, int]], count: int, meter: _Meter
+) -> None:
+    """Run `python -m evplace.city.worker` for each drive, `count` at a time.
+
+    Not multiprocessing: that would run the caller's own script again in each process. The first process
+    starts alone until it renders, so that the loops are compiled once, not `count` times.
+    """
+    running: list[subprocess.Popen[str]] = []
+
+    def make(pair: tuple[str, int]) -> None:
+        _work(folder, settings, pair, running, meter.of(drive_name(*pair)))
+
+    _compile(settings)
+    try:
+        with ThreadPoolExecutor(count) as pool:
+            for _ in pool.map(make, todo):
+                pass
+    finally:
+        for process in running:
+            process.kill()
+
+
+def _compile(settings: CitySettings) -> None:
+    """Render a moment of each condition, so that the compiled loops lie on the disk for all processes."""
+    from evplace.city.warming import warm
+
+    warm(settings)
+
+
+def _work(
+    folder: Path,
+    settings: CitySettings,
+    pair: tuple[str, int],
+    running: list[subprocess.Popen[str]],
+    tell: Callable[[float], None],
+) -> None:
+    """One drive in a process of its own; its lines are shares, or an error."""
+    job = json.dumps(
+        {"out": str(folder), "settings": to_dict(settings), "condition": pair[0], "path": pair[1]}
+    )
+    command = [sys.executable, "-m", "evplace.city.worker", job]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=_environment()) as process:
+        running.append(process)
+        for line in _lines(process):
+            if line.startswith("error "):
+                raise _error(line.removeprefix("error "))
+            tell(float(line))
+    if process.returncode != 0:
+        raise OutputError(f"the drive {drive_name(*pair)} was stopped (exit {process.returncode}): run again")
+
+
+def _lines(process: subprocess.Popen[str]) -> Iterator[str]:
+    assert process.stdout is not None
+    return (line.strip() for line in process.stdout)
+
+
+def _environment() -> dict[str, str]:
+    """The worker imports the same evplace as its caller."""
+    source = str(Path(evplace.__file__).parents[1])
+    before = os.environ.get("PYTHONPATH")
+    return {**os.environ, "PYTHONPATH": source + (os.pathsep + before if before else "")}
+
+
+def _error(line: str) -> EvplaceError:
+    told = json.loads(line)
+    kind = getattr(errors, told["kind"], OutputError)
+    return kind(told["text"]) if issubclass(kind, EvplaceError) else OutputError(told["text"])

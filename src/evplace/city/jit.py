@@ -1,0 +1,15 @@
+"""How the city's loops are compiled: cached on disk, no fast-math, so that a seed gives the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+from numba import njit
+
+Loop = TypeVar("Loop", bound=Callable[..., object])
+
+
+def compiled(loop: Loop) -> Loop:
+    """Decorator of every hot loop of the city; dividing by zero gives infinity, as in numpy."""
+    return cast(Loop, njit(cache=True, error_model="numpy")(loop))

@@ -1,0 +1,149 @@
+"""One drive on disk: event images of each sensor, colour images, poses; streamed, so memory stays flat."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import utm
+from numpy.typing import NDArray
+
+from evplace.city.camera import ColourCamera, grey, luminance
+from evplace.city.film import ZONE, Film, GeoPose, geo_pose
+from evplace.city.plan import VERSION, CitySettings, drive_name, drive_number
+from evplace.city.town import Town
+from evplace.events import Events, Size
+from evplace.images import Imager, frame_image
+from evplace.simulators.esim import PRESETS, Simulator
+from evplace.storage import GrowingArray, new_folder
+from evplace.tracks import Track
+from evplace.traverse import TraverseWriter, new_traverse
+
+COLOUR = "colour"
+"""Folder of the colour traverse, beside one for each sensor."""
+
+Tick = Callable[[float], None]
+"""Is told the share of a drive that is done."""
+
+
+def record_drive(out: Path, town: Town, settings: CitySettings, name: str, path: int, tick: Tick) -> None:
+    """Drive once and write `out/<condition>-<path>`, which appears whole when the drive has ended."""
+    size = (settings.width, settings.height)
+    film = Film(town, path, name, size, settings.seed, settings.route_length_m or None)
+    with (
+        new_folder(out / drive_name(name, path), overwrite=True) as folder,
+        contextlib.ExitStack() as open_now,
+    ):
+        info = {"source": VERSION, "condition": name, "path": path, **settings.of_drive()}
+        sensors = [
+            _Sensor(open_now, folder, preset, size, settings, drive_number(name, path), info)
+            for preset in settings.sensors
+        ]
+        colour = open_now.enter_context(new_traverse(folder / COLOUR, {**info, "sensor": COLOUR}))
+        poses = np.array(_drive(film, settings, sensors, colour, drive_number(name, path), tick))
+        for writer in (colour, *(sensor.writer for sensor in sensors)):
+            writer.track = _track(np.array(colour.t_us), poses)
+        np.save(folder / "poses.npy", poses)
+
+
+def _drive(
+    film: Film,
+    settings: CitySettings,
+    sensors: list[_Sensor],
+    colour: TraverseWriter,
+    number: int,
+    tick: Tick,
+) -> list[GeoPose]:
+    """Render every frame, feed every sensor, keep an image now and then; returns the images' poses."""
+    camera = ColourCamera([settings.seed, number])
+    every = settings.fps // settings.image_hz
+    times, poses = film.times(settings.fps), []
+    for k, t_us in enumerate(times):
+        radiance = film.radiance(t_us)
+        camera.expose(radiance, t_us)
+        light, grey8 = luminance(radiance), grey(camera.picture(radiance))
+        due = k > 0 and k % every == 0
+        for sensor in sensors:
+            image_us = times[min(math.ceil(k / every) * every, len(times) - 1)]
+            sensor.see(light, grey8, t_us, image_us - settings.window_us)
+            if due:
+                sensor.keep(t_us)
+        if due:
+            colour.add(frame_image(camera.noisy_picture(radiance)), t_us)
+            poses.append(geo_pose(film.drive.pose(t_us)))
+            tick(k / len(times))
+    return poses
+
+
+class _Sensor:
+    """One event camera of a drive, its images and, if wanted, its events."""
+
+    def __init__(
+        self,
+        open_now: contextlib.ExitStack,
+        folder: Path,
+        preset: str,
+        size: Size,
+        settings: CitySettings,
+        number: int,
+        info: dict[str, object],
+    ) -> None:
+        self._coded = preset == "from-8bit"
+        self._simulator = Simulator(size, PRESETS[preset], settings.seed, number)
+        self._imager = Imager(size)
+        self._count = 0
+        self.writer = open_now.enter_context(new_traverse(folder / preset, {**info, "sensor": preset}))
+        self._events: _EventFiles | None = None
+        if settings.keep_events:
+            self._events = open_now.enter_context(_event_files(folder / f"{preset}-events"))
+
+    def see(self, light: NDArray[np.float32], grey8: NDArray[np.uint8], t_us: int, opens_us: int) -> None:
+        """Take a frame; events after `opens_us` belong to the next image."""
+        events = self._simulator.push(grey8 if self._coded else light, t_us)
+        if self._events is not None:
+            self._events.add(events)
+        window = events[int(np.searchsorted(events.t_us, opens_us, "right")) :]
+        self._imager.add(window)
+        self._count += len(window)
+
+    def keep(self, t_us: int) -> None:
+        """Write the image of the window that ends now."""
+        self.writer.add(self._imager.image(t_us), t_us, self._count)
+        self._count = 0
+
+
+class _EventFiles:
+    """Events as t_us.npy, x.npy, y.npy and p.npy."""
+
+    def __init__(self, folder: Path) -> None:
+        folder.mkdir()
+        kinds = {"t_us": np.int64, "x": np.uint16, "y": np.uint16, "p": np.bool_}
+        self._arrays = {name: GrowingArray(folder / f"{name}.npy", kind, ()) for name, kind in kinds.items()}
+
+    def add(self, events: Events) -> None:
+        for name, array in self._arrays.items():
+            array.extend(getattr(events, name))
+
+    def close(self) -> None:
+        for array in self._arrays.values():
+            array.close()
+
+
+@contextlib.contextmanager
+def _event_files(folder: Path) -> Iterator[_EventFiles]:
+    files = _EventFiles(folder)
+    try:
+        yield files
+    finally:
+        files.close()
+
+
+def _track(t_us: NDArray[np.int64], poses: NDArray[np.float64]) -> Track:
+    """The true positions and headings at the images' times."""
+    easting, northing = poses[:, 0].copy(), poses[:, 1].copy()
+    latitude, longitude = utm.to_latlon(easting, northing, ZONE, northern=True)
+    heading = np.mod(90.0 - np.degrees(poses[:, 3]), 360.0)
+    return Track(t_us, latitude, longitude, easting, northing, heading, ZONE, True)
