@@ -87,6 +87,14 @@ def hdf5(folder: Path, events: Events) -> Path:
     return path
 
 
+def text(folder: Path, events: Events) -> Path:
+    """Seconds, as rpg's data sets write them."""
+    rows = zip(events.t_us.tolist(), events.x.tolist(), events.y.tolist(), events.p.tolist(), strict=True)
+    path = folder / "made.txt"
+    path.write_text("240 180\n" + "".join(f"{t / 1e6:.6f} {x} {y} {p:d}\n" for t, x, y, p in rows))
+    return path
+
+
 def evt3_words(events: Events) -> np.ndarray:
     """Events one by one, each with its row and time."""
     words = np.empty((len(events), 4), np.uint16)
@@ -182,5 +190,6 @@ MAKERS: dict[str, Callable[[Path, Events], Path]] = {
     "npz": npz,
     "ros1": ros1,
     "ros2_db3": ros2_db3,
+    "text": text,
 }
 """By the name of the format: writes events into a folder and returns the file."""
