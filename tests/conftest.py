@@ -3,9 +3,26 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import settings
+
+from evplace.events import Events
+from evplace.images import ImageSettings
+from evplace.placemap import PlaceMap
+from evplace.places import PlaceGrid
+from evplace.settings import to_dict
+from evplace.stream import event_images
+from evplace.tracks import Track
+from evplace.training import train
+from evplace.traverse import Traverse
+from evplace.windows import WindowSettings
+
+settings.register_profile("evplace", deadline=None)  # the first call of a numba loop compiles it
+settings.load_profile("evplace")
 
 
 @pytest.fixture(scope="session")
@@ -24,3 +41,82 @@ def golden(data: Path) -> Path:
     if not folder.is_dir():
         pytest.skip(f"no golden outputs at {folder}")
     return folder
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A made-up street that is driven along: what the events and the images of it are."""
+
+    events: Events
+    """Edges of a long picture that slides past the sensor, 8 pixels a window."""
+    track: Track
+    """A straight road, 2 m a window."""
+
+
+def make_drive(seed: int = 0, windows: int = 60, noise: float = 0.002) -> Drive:
+    """A drive of `windows` windows of 1/30 s past the same street; `seed` changes only its noise."""
+    street = np.random.default_rng(99).random((60, 80 + 8 * windows)) < 0.12
+    rng = np.random.default_rng(seed)
+    parts = []
+    for n in range(windows):
+        seen = street[:, 8 * n : 8 * n + 80] ^ (rng.random((60, 80)) < noise)
+        y, x = np.nonzero(seen)
+        t_us = np.sort(rng.integers(n * 1_000_000 // 30 + 2, (n + 1) * 1_000_000 // 30, len(x)))
+        parts.append(Events.of(t_us, x, y, rng.random(len(x)) < 0.5, (80, 60)))
+    first = Events.of([0], [0], [0], [True], (80, 60))
+    t_us = np.arange(windows + 2, dtype=np.int64) * 1_000_000 // 30
+    road = np.stack([500_000 + 2.0 * np.arange(windows + 2), np.full(windows + 2, 4_000_000.0)], axis=1)
+    return Drive(Events.concatenate([first, *parts]), Track.local(t_us, road))
+
+
+def make_traverse(drive: Drive) -> Traverse:
+    """The event images of a drive, with positions."""
+    found = list(event_images([drive.events], drive.events.size))
+    images = np.stack([image for image, _ in found])
+    t_us = np.array([window.t_us for _, window in found], np.int64)
+    counts = np.array([window.events for _, window in found], np.int64)
+    info = {
+        "input": "events",
+        "sensor": list(drive.events.size),
+        "windows": to_dict(WindowSettings()),
+        "images": to_dict(ImageSettings()),
+    }
+    return Traverse(images, t_us, counts, drive.track.at(t_us), info)
+
+
+@pytest.fixture(scope="session")
+def day() -> Traverse:
+    """The drive that maps are made from."""
+    return make_traverse(make_drive())
+
+
+@pytest.fixture(scope="session")
+def night_drive() -> Drive:
+    """The same street later."""
+    return make_drive(seed=1, noise=0.02)
+
+
+@pytest.fixture(scope="session")
+def night(night_drive: Drive) -> Traverse:
+    """Its event images."""
+    return make_traverse(night_drive)
+
+
+@pytest.fixture(scope="session")
+def places(day: Traverse) -> PlaceGrid:
+    """Cells of 20 m: ten images each."""
+    assert day.track is not None
+    return PlaceGrid.from_track(day.track)
+
+
+@pytest.fixture(scope="session")
+def image_map(day: Traverse, places: PlaceGrid) -> PlaceMap:
+    """A map of the images themselves."""
+    return train(day, places, scorer="ncc")
+
+
+@pytest.fixture(scope="session")
+def network_map(day: Traverse, places: PlaceGrid) -> PlaceMap:
+    """A map with a network that was trained for a moment."""
+    pytest.importorskip("torch", reason="the network needs the extra 'train'")
+    return train(day, places, steps=120, batch=16)

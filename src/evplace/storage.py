@@ -17,6 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from evplace.errors import InputError, OutputError
 
 
@@ -71,8 +74,10 @@ def locked(target: Path) -> Iterator[None]:
             raise OutputError(
                 f"{target} is being written by another process: wait for it, or write elsewhere"
             )
-        yield
-        lock.unlink(missing_ok=True)
+        try:
+            yield
+        finally:
+            lock.unlink(missing_ok=True)
     finally:
         os.close(handle)
 
@@ -93,6 +98,50 @@ def read_json(path: Path, what: str) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InputError(f"{what} is damaged: {path} holds no JSON object")
     return value
+
+
+class GrowingArray:
+    """A .npy file that grows along its first axis, so that no traverse has to fit into memory."""
+
+    def __init__(self, path: Path, dtype: type[np.generic], item_shape: tuple[int, ...]) -> None:
+        """Begin the file `path` with no items of `item_shape`."""
+        self._dtype, self._item_shape, self._length = np.dtype(dtype), item_shape, 0
+        self._file = path.open("wb")
+        self._write_header()
+
+    def append(self, item: NDArray[Any] | np.generic | int | float) -> None:
+        """Add one item."""
+        array = np.asarray(item, self._dtype)
+        assert array.shape == self._item_shape, (array.shape, self._item_shape)
+        self._file.write(array.tobytes())
+        self._length += 1
+
+    def close(self) -> None:
+        """Write the final length into the header; numpy leaves room in it for that."""
+        self._file.seek(0)
+        self._write_header()
+        self._file.close()
+
+    def discard(self) -> None:
+        """Let go of a file that will not be used; harmless after `close`."""
+        with contextlib.suppress(OSError):
+            self._file.close()
+
+    def _write_header(self) -> None:
+        shape = (self._length, *self._item_shape)
+        header = {"descr": self._dtype.str, "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(self._file, header)
+
+
+def read_array(path: Path, what: str, memory_mapped: bool = False) -> NDArray[Any]:
+    """The array in a .npy file; InputError, naming `what` it should be, where there is none."""
+    try:
+        array: NDArray[Any] = np.load(path, mmap_mode="r" if memory_mapped else None, allow_pickle=False)
+        return array
+    except OSError as error:
+        raise InputError(f"cannot read {what}: {path}: {error.strerror or error}") from error
+    except (ValueError, EOFError) as error:
+        raise InputError(f"{what} is damaged: {path} is not a whole .npy array ({error})") from error
 
 
 def sha256(path: Path) -> str:

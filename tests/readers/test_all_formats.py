@@ -138,7 +138,9 @@ def test_a_name_does_not_matter(form: str, tmp_path: Path) -> None:
 
 
 def test_memory_is_bounded(tmp_path: Path) -> None:
-    """40 M events of a sparse-looking file stay under 400 MB in a process of their own."""
+    """20 M events stay under 400 MB in a process of their own."""
+    if not Path("/proc/self/status").exists():
+        pytest.skip("this system does not tell a process's peak memory in /proc")
     path, one = tmp_path / "long.dat", np.zeros(1_000_000, [("t", "<u4"), ("data", "<u4")])
     with path.open("wb") as file:
         file.write(b"% Version 2\n% Width 640\n% Height 480\n\x0c\x08")
@@ -146,9 +148,10 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
             one["t"] = np.arange(part * 1_000_000, (part + 1) * 1_000_000)
             file.write(one.tobytes())
     code = (
-        "import resource, sys; from evplace.readers import open_recording; r = open_recording(sys.argv[1])\n"
+        "import sys; from evplace.readers import open_recording; r = open_recording(sys.argv[1])\n"
         "for packet in r.packets(): pass\n"
-        "print(r.events, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)"
+        "peak = next(line for line in open('/proc/self/status') if line.startswith('VmHWM'))\n"
+        "print(r.events, int(peak.split()[1]) // 1024)"
     )
     answer = subprocess.run(
         [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True

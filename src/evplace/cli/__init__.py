@@ -1,1 +1,83 @@
-"""cli."""
+"""The command line: parsing and wiring, nothing else. One file a command; its name is the command's name.
+
+Each file opens with a docstring (a summary line, then worked examples: both are its help) and holds `Args`, a
+frozen dataclass whose fields are the flags, and `run(args)`, which returns the exit code: 0, or 3 where a
+damaged recording's good part was used. Errors that evplace raises on purpose are one line and exit code 2.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import importlib
+import os
+import sys
+from pathlib import Path
+
+from evplace.errors import EvplaceError
+
+INTERRUPTED = 130
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command; returns the exit code."""
+    arguments = sys.argv[1:] if argv is None else argv
+    try:
+        return _run(arguments)
+    except EvplaceError as error:
+        print(f"evplace: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("evplace: interrupted; nothing half-written was left", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of our output has gone (`evplace ... | head`): that is no fault.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def commands() -> dict[str, str]:
+    """Command -> summary, read from the files without importing them."""
+    files = sorted(Path(__file__).parent.glob("[a-z]*.py"))
+    return {file.stem: _summary(file) for file in files}
+
+
+def _run(arguments: list[str]) -> int:
+    known = commands()
+    if not arguments or arguments[0] in ("-h", "--help"):
+        print(_overview(known))
+        return 0
+    if arguments[0] == "--version":
+        from evplace import __version__
+
+        print(f"evplace {__version__}")
+        return 0
+    name = arguments[0]
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean '{close[0]}'? " if close else ""
+        raise EvplaceError(f"unknown command '{name}': {hint}commands are {', '.join(known)}")
+    module = importlib.import_module(f"evplace.cli.{name}")
+    from evplace.cli._parse import parse
+
+    code: int = module.run(parse(module, name, arguments[1:]))
+    return code
+
+
+def _overview(known: dict[str, str]) -> str:
+    width = max(len(name) for name in known)
+    lines = [f"  {name:<{width}}  {summary}" for name, summary in known.items()]
+    return "\n".join(
+        [
+            "evplace: visual place recognition with event cameras",
+            "",
+            "usage: evplace COMMAND [OPTIONS]     evplace COMMAND --help shows worked examples",
+            "",
+            *lines,
+        ]
+    )
+
+
+def _summary(file: Path) -> str:
+    docstring = ast.get_docstring(ast.parse(file.read_text("utf-8"))) or ""
+    return docstring.splitlines()[0].rstrip(".")

@@ -9,6 +9,7 @@ Each file holds `Settings`, a frozen dataclass; `PRESETS`, named Settings (may b
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -19,6 +20,9 @@ from evplace.errors import SettingsError
 
 Row = NDArray[np.floating[Any]]
 """(items,) scores of one query against every map item, larger is better."""
+
+Rows = NDArray[np.floating[Any]]
+"""(queries, items) score rows in the order of the queries."""
 
 
 class Answer(NamedTuple):
@@ -63,6 +67,12 @@ class Matcher(Protocol):
         A matcher that looks ahead (SeqSLAM) answers for an earlier query: see `Answer.query`.
         """
 
+    def extend(self, rows: Rows) -> None:
+        """Take the rows of many queries at once: the same as `step` on each, without a call for each.
+
+        Any cutting of the rows into blocks gives the same `path`.
+        """
+
     def path(self) -> Path:
         """The answers for all rows so far, in hindsight where the method has any."""
 
@@ -73,9 +83,18 @@ def open_matcher(name: str, preset: str | None = None, distances: bool = False, 
     Raises SettingsError for an unknown name, preset or setting; the text lists the known ones.
     """
     module = plugs.load("matchers", name)
+    matcher: Matcher = module.matcher(_settings(module, name, preset, values), distances)
+    return matcher
+
+
+def resolved_settings(name: str, preset: str | None = None, **values: object) -> dict[str, Any]:
+    """All settings of a matcher as plain values; raises as `open_matcher` does."""
+    return settings.to_dict(_settings(plugs.load("matchers", name), name, preset, values))
+
+
+def _settings(module: ModuleType, name: str, preset: str | None, values: dict[str, object]) -> object:
     if preset is not None and preset not in module.PRESETS:
         known = ", ".join(sorted(module.PRESETS)) or "none"
         raise SettingsError(f"the matcher '{name}' has no preset '{preset}': known are {known}")
     base = module.PRESETS[preset] if preset is not None else None
-    matcher: Matcher = module.matcher(settings.make(module.Settings, values, base), distances)
-    return matcher
+    return settings.make(module.Settings, values, base)

@@ -1,0 +1,88 @@
+"""What several commands print."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+USED_GOOD_PART = 3
+"""Exit code where a recording is damaged and its good part was used."""
+
+
+def print_json(value: object) -> None:
+    """One JSON object on standard output; NaN becomes null, because JSON has none."""
+    print(json.dumps(_plain(value)))
+
+
+def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
+    """A table for people."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(*columns, title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for row in rows:
+        table.add_row(*[cell if isinstance(cell, str) else _text(cell) for cell in row])
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
+
+
+def print_facts(title: str, facts: Mapping[str, object]) -> None:
+    """Names and values for people; a mapping is written as its counts above zero."""
+    width = max(len(name) for name in facts)
+    print(title)
+    for name, value in facts.items():
+        print(f"  {name:<{width}}  {_text(value)}")
+
+
+def note(text: str) -> None:
+    """A remark beside the answer: on standard error."""
+    print(f"evplace: {text}", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
+    """A bar with rate and time left, on standard error; call what it gives with (done, total, remark)."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn(what),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[remark]}"),
+    )
+    with Progress(*columns, console=Console(stderr=True), disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task(what, rate="", remark="")
+
+        def show(done: int, total: int, remark: str) -> None:
+            speed = bar.tasks[0].speed
+            rate = f"{speed:.1f}/s" if speed else ""
+            bar.update(task, completed=done, total=total, rate=rate, remark=remark)
+
+        yield show
+
+
+def _text(value: object) -> str:
+    if isinstance(value, float):
+        return "-" if math.isnan(value) else f"{value:.4g}"
+    if isinstance(value, dict):
+        return ", ".join(f"{inner:,} {name}" for name, inner in value.items() if inner) or "none"
+    if isinstance(value, int) and not isinstance(value, bool):
+        return f"{value:,}"
+    return "-" if value is None else str(value)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, dict):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return value

@@ -1,0 +1,77 @@
+"""Flags -> a command's Args. A settings file is flags written down: those on the command line win over it."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import io
+from pathlib import Path
+from types import ModuleType
+from typing import Any, get_type_hints
+
+import tyro
+
+from evplace import settings
+from evplace.errors import SettingsError
+
+
+def parse(module: ModuleType, name: str, arguments: list[str]) -> Any:
+    """The Args of a command; prints its help and exits with `--help`, SettingsError for a wrong flag."""
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            return tyro.cli(
+                module.Args,
+                prog=f"evplace {name}",
+                description=module.__doc__,
+                args=_from_file(module.Args, arguments) + arguments,
+                config=(tyro.conf.FlagCreatePairsOff,),
+            )
+    except SystemExit as stop:
+        if not stop.code:
+            raise
+        raise SettingsError(f"{_plain(said.getvalue())}; see evplace {name} --help") from None
+
+
+def _plain(message: str) -> str:
+    """Tyro's framed message as one line."""
+    lines = (line.strip("│╭╮╰╯─ \n") for line in message.splitlines())
+    kept = [line for line in lines if line and not line.startswith(("Parsing error", "For full helptext"))]
+    return " ".join(kept) or "the flags cannot be read"
+
+
+def _from_file(kind: type[Any], arguments: list[str]) -> list[str]:
+    """What the file after `--settings` says, as flags."""
+    if "--settings" not in arguments[:-1]:
+        return []
+    file = Path(arguments[arguments.index("--settings") + 1])
+    return _flags(kind, settings.from_toml(file), str(file))
+
+
+def _flags(kind: type[Any], values: dict[str, Any], where: str) -> list[str]:
+    hints = get_type_hints(kind)
+    known = sorted(field.name for field in dataclasses.fields(kind))
+    flags: list[str] = []
+    for key, value in values.items():
+        if key not in known:
+            raise SettingsError(f"unknown setting '{key}' in {where}: known are {', '.join(known)}")
+        if dataclasses.is_dataclass(hints[key]):
+            flags += _flags(hints[key], value, f"[{key}] of {where}")
+        else:
+            flags += _flag(key, value)
+    return flags
+
+
+def _flag(key: str, value: object) -> list[str]:
+    name = key.replace("_", "-")
+    if isinstance(value, bool):
+        return [f"--{name}" if value else f"--no-{name}"]
+    if isinstance(value, dict):
+        return [word for pair in value.items() for word in (f"--{name}", "=".join(map(_text, pair)))]
+    if isinstance(value, list):
+        return [f"--{name}", *map(_text, value)]
+    return [f"--{name}", _text(value)]
+
+
+def _text(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

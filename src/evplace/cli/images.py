@@ -1,0 +1,74 @@
+"""Turn a recording, or a folder of images, into a traverse folder of event images.
+
+Examples:
+  evplace images night.aedat4 -o night
+  evplace images night.aedat4 -o night --track night.nmea       with positions
+  evplace images night.aedat4 -o night --dt 1/60 --sheet night.png
+  evplace images frames/ -o day --crop-bottom 0 --width 80 --height 80
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from evplace.capture import record
+from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
+from evplace.images import ImageSettings
+from evplace.sheets import contact_sheet
+from evplace.traverse import Traverse, new_traverse
+from evplace.windows import WindowSettings
+
+
+@dataclass(frozen=True)
+class Args:
+    """Flags of `evplace images`."""
+
+    source: tyro.conf.Positional[Path]
+    """An event recording, or a folder of images."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+    """The traverse folder to write."""
+    track: Path | None = None
+    """GPS log of the same drive: NMEA, GPX or csv."""
+    size: tuple[int, int] | None = None
+    """Width and height of the sensor in pixels, where the file does not say."""
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None
+    """Unit of the times, where the file does not say."""
+    sheet: Path | None = None
+    """Also write a .png that shows some of the images."""
+    windows: Annotated[WindowSettings, tyro.conf.arg(name="")] = field(default_factory=WindowSettings)
+    images: Annotated[ImageSettings, tyro.conf.arg(name="")] = field(default_factory=ImageSettings)
+    settings: Path | None = None
+    """A TOML file with any of these settings; windows and images are its tables."""
+    overwrite: bool = False
+    """Replace what exists."""
+    json: bool = False
+    """Print one JSON object."""
+
+
+def run(args: Args) -> int:
+    """Write the traverse, and the sheet if asked."""
+    with new_traverse(args.out, {}, args.overwrite) as writer:
+        fault = record(args.source, writer, args.track, args.windows, args.images, args.size, args.time_unit)
+    traverse = Traverse.load(args.out)
+    if args.sheet is not None:
+        contact_sheet(traverse.images, args.sheet, args.overwrite)
+    placed = int(traverse.track.known.sum()) if traverse.track is not None else 0
+    facts = {
+        "images": len(traverse),
+        "shape": list(traverse.images.shape[1:]),
+        "empty": int((traverse.counts == 0).sum()),
+        "with_position": placed,
+        "dropped": traverse.info.get("dropped", {}),
+        "fault": fault,
+    }
+    if args.json:
+        print_json(facts)
+    else:
+        print_facts(str(args.out), facts)
+    if fault is not None:
+        note(f"{fault}; the images before it were written")
+    return USED_GOOD_PART if fault is not None else 0

@@ -1,0 +1,153 @@
+"""How good the answers are: figures, the exact precision-recall curve, and the folder that keeps them.
+
+Of a judged query, `accepted` says that the matcher stands by its item, `right` that the truth takes this
+item, `seen` that the truth takes any item. TP: accepted and right; FP: accepted otherwise; FN: not accepted
+though seen; TN: not accepted and unseen. "Not seen before" on an unseen query counts as right in the
+accuracy, as it does by all evidence in the paper; the accuracy on seen queries stands beside it.
+"""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Iterable, Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from evplace import __version__
+from evplace.errors import EvaluationError
+from evplace.evaluation import _measures
+from evplace.evaluation._measures import (
+    CURVE,
+    RECALLS_AT,
+    Bools,
+    Floats,
+    average_precision,
+    gallery_spacing,
+    hits_at,
+    precision_recall,
+)
+from evplace.evaluation._result import Result
+from evplace.matchers import Path as Answers
+from evplace.truth import Truth
+
+__all__ = [
+    "CURVE",
+    "RECALLS_AT",
+    "Result",
+    "average_precision",
+    "compare",
+    "gallery_spacing",
+    "hits_at",
+    "measure",
+    "precision_recall",
+]
+
+
+def measure(
+    answers: Answers,
+    truth: Truth,
+    scores: NDArray[np.floating[Any]] | None = None,
+    positions: ArrayLike | None = None,
+    t_us: ArrayLike | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> Result:
+    """The figures of a matcher's `answers` (queries) by `truth`.
+
+    `scores` (queries, items) adds recall@N; `positions` (items, 2) in metres adds the gallery spacing;
+    `t_us` (queries,) and `settings` are kept with the result. Queries that the truth knows nothing of are
+    left out and counted. Raises EvaluationError where the parts do not fit or no query is judged.
+    """
+    _check(answers, truth, scores)
+    right, seen, shares, ranked = _compare_with_truth(answers, truth, scores)
+    accepted = answers.accepted & (answers.item >= 0)
+    judged = truth.judged
+    curve = precision_recall(answers.score[judged], right[judged], seen[judged], answers.item[judged] >= 0)
+    figures = (
+        {"queries": len(judged), "left_out": int(np.sum(~judged)), "items": truth.n_items}
+        | _measures.at_decision(accepted[judged], right[judged], seen[judged])
+        | _measures.of_curve(curve)
+        | _measures.chance(shares[judged], seen[judged])
+        | (_measures.recalls(ranked[judged], seen[judged]) if ranked is not None else {})
+        | {"gallery_spacing_m": None if positions is None else gallery_spacing(positions)}
+    )
+    times = np.full(len(judged), -1) if t_us is None else np.asarray(t_us, np.int64)
+    resolved = dict(settings or {}) | {"truth": truth.rule}
+    return Result(figures, resolved, _versions(), answers, times, judged, seen, right, curve, scores)
+
+
+def compare(results: Iterable[Result | str | Path]) -> list[dict[str, Any]]:
+    """One row a result: its name, its figures, and those settings in which the results differ.
+
+    Folders are read, nothing is run again. Nested settings are named as in `truth.cell_m`.
+    """
+    named = [_named(result, number) for number, result in enumerate(results, 1)]
+    settings = [_flat(result.settings) for _, result in named]
+    keys = list(dict.fromkeys(key for one in settings for key in one))
+    differing = [key for key in keys if any(one.get(key) != settings[0].get(key) for one in settings)]
+    return [
+        {"result": name} | _flat(result.figures) | {key: one.get(key) for key in differing}
+        for (name, result), one in zip(named, settings, strict=True)
+    ]
+
+
+def _check(answers: Answers, truth: Truth, scores: NDArray[np.floating[Any]] | None) -> None:
+    if not len(answers.item) == len(answers.score) == len(answers.accepted) == truth.n_queries:
+        raise EvaluationError(f"{len(answers.item)} answers do not fit a truth of {truth.n_queries} queries")
+    if np.any((answers.item < -1) | (answers.item >= truth.n_items)):
+        raise EvaluationError(
+            f"answers name items {answers.item.min()} to {answers.item.max()}, the truth has "
+            f"{truth.n_items}: evaluate with the truth of the map that gave the answers"
+        )
+    if scores is not None and scores.shape != (truth.n_queries, truth.n_items):
+        raise EvaluationError(
+            f"scores of shape {scores.shape} do not fit {truth.n_queries} queries (rows) and "
+            f"{truth.n_items} items"
+        )
+    if not truth.judged.any():
+        raise EvaluationError(
+            f"none of the {truth.n_queries} queries has a position or a known answer: give a track that "
+            "spans the drive, or another truth"
+        )
+
+
+def _compare_with_truth(
+    answers: Answers, truth: Truth, scores: NDArray[np.floating[Any]] | None
+) -> tuple[Bools, Bools, Floats, Floats | None]:
+    """In one pass over the truth: (queries,) right, seen, share of right items; (queries, N, 3) hits."""
+    right, seen = np.zeros(truth.n_queries, np.bool_), np.zeros(truth.n_queries, np.bool_)
+    shares = np.zeros(truth.n_queries)
+    hits = np.zeros((truth.n_queries, len(RECALLS_AT), 3))
+    for part, block in truth.blocks():
+        items = answers.item[part]
+        right[part] = block[np.arange(len(block)), items] & (items >= 0)
+        seen[part] = block.any(axis=1)
+        shares[part] = block.mean(axis=1)
+        if scores is not None:
+            hits[part] = hits_at(scores[part], block, RECALLS_AT)
+    return right, seen, shares, hits if scores is not None else None
+
+
+def _versions() -> dict[str, str]:
+    """Of this package, python, and those packages at work here that can change a figure."""
+    loaded = [name for name in ("numpy", "numba", "onnxruntime", "torch") if name in sys.modules]
+    ours = {"evplace": __version__, "python": platform.python_version()}
+    return ours | {name: metadata.version(name) for name in loaded}
+
+
+def _named(result: Result | str | Path, number: int) -> tuple[str, Result]:
+    if isinstance(result, Result):
+        return str(number), result
+    return Path(result).name, Result.load(result)
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one, with dots in the names."""
+    flat: dict[str, Any] = {}
+    for key, value in values.items():
+        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
+    return flat

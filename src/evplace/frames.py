@@ -1,0 +1,114 @@
+"""A folder of camera images, in order, with their times.
+
+The order and the times come from `timestamps.txt` (one time in seconds a line) or from a .csv list (a column
+of file names; a further column may hold times), else from the file names, at `fps` images a second.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.errors import TraverseError
+
+SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Images on disk, in order."""
+
+    files: tuple[Path, ...]
+    """The image files."""
+    t_us: NDArray[np.int64]
+    """(n,) times in microseconds, increasing."""
+    timed: bool
+    """Whether the times were given, not made up from a rate."""
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
+        """Each image as uint8 (H, W), or (H, W, 3) where it has colours."""
+        return (read_image(file) for file in self.files)
+
+
+def is_frames(path: Path) -> bool:
+    """Whether `path` is a folder that holds images."""
+    return path.is_dir() and any(file.suffix.lower() in SUFFIXES for file in path.iterdir())
+
+
+def open_frames(path: str | Path, listing: str | Path | None = None, fps: float = 30.0) -> Frames:
+    """The images of a folder.
+
+    `listing` is a .csv or .txt with a file name in the first column of each line: only those are taken, in
+    its order. Raises TraverseError for a folder without images, or for times that do not fit.
+    """
+    folder = Path(path)
+    if not folder.is_dir():
+        raise TraverseError(f"{folder} is no folder of images")
+    files = _listed(folder, Path(listing)) if listing else _found(folder)
+    if not files:
+        raise TraverseError(f"{folder} holds no images: known are {', '.join(SUFFIXES)}")
+    times = folder / "timestamps.txt"
+    if not times.exists():
+        times = folder.parent / "timestamps.txt"
+    if times.exists():
+        return Frames(tuple(files), _times(times, len(files)), True)
+    if fps <= 0:
+        raise TraverseError(f"images without times need a rate above 0, not {fps} images a second")
+    return Frames(tuple(files), np.arange(len(files), dtype=np.int64) * 1_000_000 // round(fps), False)
+
+
+def read_image(file: Path) -> NDArray[np.uint8]:
+    """An image file as uint8 (H, W), or (H, W, 3) where it has colours."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(file) as image:
+            grey = image.mode in ("1", "L", "I", "F", "I;16")
+            return np.asarray(image.convert("L" if grey else "RGB"), np.uint8)
+    except FileNotFoundError:
+        raise TraverseError(f"there is no image {file}") from None
+    except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
+        raise TraverseError(f"cannot read the image {file}: {error}") from error
+
+
+def _found(folder: Path) -> list[Path]:
+    """Image files in the order of the numbers in their names."""
+    files = [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
+    return sorted(files, key=lambda file: [int(n) for n in re.findall(r"\d+", file.stem)] + [0])
+
+
+def _listed(folder: Path, listing: Path) -> list[Path]:
+    try:
+        rows = list(csv.reader(listing.read_text("utf-8-sig").splitlines()))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise TraverseError(f"cannot read the list of images {listing}: {error}") from error
+    names = [row[0].strip() for row in rows if row]
+    files = [folder / name for name in names if Path(name).suffix.lower() in SUFFIXES]
+    missing = [file.name for file in files if not file.exists()]
+    if missing:
+        raise TraverseError(f"{listing} names {len(missing)} images that {folder} lacks, first {missing[0]}")
+    return files
+
+
+def _times(path: Path, n: int) -> NDArray[np.int64]:
+    """Times in seconds, one a line, as microseconds."""
+    try:
+        seconds = [line.split()[-1] for line in path.read_text("utf-8").splitlines() if line.strip()]
+        t_us = np.array([round(float(value) * 1e6) for value in seconds], np.int64)
+    except (ValueError, OverflowError, UnicodeDecodeError) as error:
+        raise TraverseError(f"{path} must hold one time in seconds a line: {error}") from error
+    if len(t_us) != n:
+        raise TraverseError(f"{path} holds {len(t_us)} times for {n} images: one a line is needed")
+    if (np.diff(t_us) <= 0).any():
+        first = int(np.argmax(np.diff(t_us) <= 0)) + 1
+        raise TraverseError(f"{path}: time {first + 1} does not come after the one before it")
+    return t_us

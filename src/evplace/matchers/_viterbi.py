@@ -1,0 +1,122 @@
+"""The best path through a whole matrix, one item a query: dynamic programming with bounded steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+JUMP = np.iinfo(np.int16).min
+"""A step that stands for a jump from the best item of the query before."""
+
+LONGEST_STEP = int(np.iinfo(np.int16).max)
+"""Steps are kept as int16."""
+
+
+class Viterbi:
+    """Maximises the sum of gains along a path; remembers one step, 2 bytes, for each query and item.
+
+    From one query to the next the item grows by `low` to `high`, which adds `stay`, or jumps anywhere, which
+    adds `jump` (-inf: never). Among equal parents the lowest item wins, and the step over the jump.
+    """
+
+    def __init__(self, low: int, high: int, stay: float = 0.0, jump: float = -np.inf) -> None:
+        self._rule = (low, high, stay, jump)
+        self._sums: NDArray[np.float64] = np.empty(0)
+        self._steps: list[NDArray[np.int16]] = []
+        self._tops: list[NDArray[np.int64]] = []
+
+    def extend(self, gains: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Take the next queries' gains (queries, items); for each the end of the best path so far."""
+        if not len(self._sums):
+            self._sums = np.full(gains.shape[1], np.nan)
+        steps, tops = np.empty(gains.shape, np.int16), np.empty(len(gains), np.int64)
+        ends: NDArray[np.int64] = _forward(gains, self._sums, steps, tops, *self._rule)
+        self._steps.append(steps)
+        self._tops.append(tops)
+        return ends
+
+    def trace(self) -> NDArray[np.int64]:
+        """The best path's item for each query so far, the lowest end among equals."""
+        item = np.empty(sum(map(len, self._tops)), np.int64)
+        at = int(self._sums.argmax()) if len(item) else 0
+        query = len(item)
+        for steps, tops in zip(reversed(self._steps), reversed(self._tops), strict=True):
+            for i in range(len(tops) - 1, -1, -1):
+                query -= 1
+                item[query] = at
+                at = int(tops[i] if steps[i, at] == JUMP else at - steps[i, at])
+        return item
+
+
+def pieces(table: NDArray[Any], rows: int = 256) -> Iterator[NDArray[Any]]:
+    """The rows of `table` in pieces small enough to make something larger of them."""
+    return (table[start : start + rows] for start in range(0, len(table), rows))
+
+
+@njit(cache=True)
+def _forward(
+    gains: NDArray[np.float64],
+    sums: NDArray[np.float64],
+    steps: NDArray[np.int16],
+    tops: NDArray[np.int64],
+    low: int,
+    high: int,
+    stay: float,
+    jump: float,
+) -> NDArray[np.int64]:
+    """Fill `steps`, and `tops` with the best item before each query; `sums` (items,) is NaN at first."""
+    queries, items = gains.shape
+    ends = np.empty(queries, np.int64)
+    before = np.empty(items)
+    chosen = np.empty(items, np.int16)
+    for i in range(queries):
+        if np.isnan(sums[0]):
+            sums[:] = gains[i]
+            steps[i] = 0
+            tops[i] = 0
+        else:
+            before[:] = sums
+            tops[i] = np.argmax(before)
+            _best_parents(before, sums, chosen, low, high)
+            leap = before[tops[i]] + jump
+            for r in range(items):
+                stepped = sums[r] + stay
+                steps[i, r] = JUMP if leap > stepped else chosen[r]
+                sums[r] = max(leap, stepped) + gains[i, r]
+        ends[i] = np.argmax(sums)
+    return ends
+
+
+@njit(cache=True)
+def _best_parents(
+    before: NDArray[np.float64], best: NDArray[np.float64], chosen: NDArray[np.int16], low: int, high: int
+) -> None:
+    """For each item the largest sum of the items `low` to `high` steps before it, and that step."""
+    items = before.shape[0]
+    best[:] = -np.inf
+    for r in range(items):
+        chosen[r] = min(high, r)
+    for step in range(high, low - 1, -1):
+        reach = abs(step)
+        if reach >= items:
+            continue
+        child, parent = (reach, 0) if step > 0 else (0, reach)
+        _raise(
+            best[child : items - parent],
+            before[parent : items - child],
+            chosen[child : items - parent],
+            np.int16(step),
+        )
+
+
+@njit(cache=True)
+def _raise(
+    best: NDArray[np.float64], other: NDArray[np.float64], chosen: NDArray[np.int16], step: np.int16
+) -> None:
+    for r in range(best.shape[0]):
+        chosen[r] = step if other[r] > best[r] else chosen[r]
+        best[r] = max(best[r], other[r])

@@ -1,0 +1,149 @@
+"""Blur, crop and resize as one sparse linear map for each axis, with exact integer weights.
+
+Each of the three steps is linear and separable, so their composition is too: out = R_y I R_x^T, where a row
+of R has a few neighbouring taps. Composed in exact fractions and brought to one denominator, the whole map is
+exact for binary images: integer sums and one division at the end.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Taps = dict[int, Fraction]
+Resize = Literal["area", "linear"]
+
+BLUR = (Fraction(1, 4), Fraction(1, 2), Fraction(1, 4))
+"""The 3x3 Gaussian for each axis: OpenCV's kernel for size 3 with sigma 0 (paper, section 3.2)."""
+
+
+@dataclass(frozen=True)
+class AxisMap:
+    """A sparse row map from `n_in` inputs to `len(start)` outputs."""
+
+    start: NDArray[np.int64]
+    """(out,) first input that each output reads."""
+    weights: NDArray[np.int64]
+    """(out, taps) integer weights; zero beyond an output's own taps."""
+    total: int
+    """What the weights of every output sum to: divide by it."""
+
+
+def axis_map(n_in: int, n_kept: int, n_out: int, blur: bool, resize: Resize) -> AxisMap:
+    """Blur all `n_in` inputs, keep the first `n_kept`, resize them to `n_out`."""
+    resized = _area(n_kept, n_out) if resize == "area" else _linear(n_kept, n_out)
+    rows = [_blurred(taps, n_in) if blur else taps for taps in resized]
+    total = math.lcm(*(weight.denominator for taps in rows for weight in taps.values()))
+    width = max(max(taps) - min(taps) + 1 for taps in rows)
+    # Near the far edge the window of taps is moved back inside; the freed taps weigh nothing.
+    start = np.array([min(min(taps), n_in - width) for taps in rows], np.int64)
+    weights = np.zeros((n_out, width), np.int64)
+    for out, taps in enumerate(rows):
+        for index, weight in taps.items():
+            weights[out, index - start[out]] = int(weight * total)
+    return AxisMap(start, weights, total)
+
+
+def _area(n_in: int, n_out: int) -> list[Taps]:
+    """Each output is the mean over its share of the inputs."""
+    step = Fraction(n_in, n_out)
+    rows = []
+    for out in range(n_out):
+        left, right = out * step, (out + 1) * step
+        inputs = range(math.floor(left), math.ceil(right))
+        rows.append({i: (min(right, Fraction(i + 1)) - max(left, Fraction(i))) / step for i in inputs})
+    return rows
+
+
+def _linear(n_in: int, n_out: int) -> list[Taps]:
+    """Each output is interpolated between the two inputs beside its centre; ends are held."""
+    rows = []
+    for out in range(n_out):
+        centre = Fraction(2 * out + 1, 2) * Fraction(n_in, n_out) - Fraction(1, 2)
+        centre = min(max(centre, Fraction(0)), Fraction(n_in - 1))
+        left = math.floor(centre)
+        taps = {left: 1 - (centre - left), left + 1: centre - left}
+        rows.append({index: weight for index, weight in taps.items() if weight})
+    return rows
+
+
+def _blurred(taps: Taps, n_in: int) -> Taps:
+    """The taps behind the blur; borders are mirrored without repeating the edge (reflect-101)."""
+    spread: Taps = {}
+    for index, weight in taps.items():
+        for shift, share in zip((-1, 0, 1), BLUR, strict=True):
+            source = _mirrored(index + shift, n_in)
+            spread[source] = spread.get(source, Fraction(0)) + weight * share
+    return spread
+
+
+def _mirrored(index: int, n: int) -> int:
+    if n == 1:
+        return 0
+    if index < 0:
+        return -index
+    return 2 * (n - 1) - index if index >= n else index
+
+
+def resample_binary(canvas: NDArray[np.uint8], rows: AxisMap, columns: AxisMap) -> NDArray[np.float32]:
+    """A canvas (H, W) of zeros and ones through both maps: (h, w) float32 in [0, 1]."""
+    if rows.total > np.iinfo(np.uint16).max:
+        return resample_float(canvas.astype(np.float32), rows, columns)
+    lines = np.empty((len(rows.start), canvas.shape[1]), np.uint16)
+    _resample_rows(canvas, rows.start, rows.weights.astype(np.uint16), lines)
+    # Turned, so that the horizontal pass too runs along contiguous memory.
+    sums = np.empty((len(columns.start), len(rows.start)), np.int64)
+    _resample_turned(np.ascontiguousarray(lines.T), columns.start, columns.weights, sums)
+    return np.ascontiguousarray(sums.T) * np.float32(1 / (rows.total * columns.total))
+
+
+def resample_float(canvas: NDArray[np.float32], rows: AxisMap, columns: AxisMap) -> NDArray[np.float32]:
+    """A canvas (H, W) of any values through both maps: (h, w) float32."""
+    lines = np.empty((len(rows.start), canvas.shape[1]), np.float64)
+    _resample_float(canvas, rows.start, rows.weights / rows.total, lines)
+    sums = np.empty((len(columns.start), len(rows.start)), np.float64)
+    _resample_float(np.ascontiguousarray(lines.T), columns.start, columns.weights / columns.total, sums)
+    return np.ascontiguousarray(sums.T, np.float32)
+
+
+@njit(cache=True)
+def _resample_rows(canvas: Any, start: Any, weights: Any, out: Any) -> None:
+    """Zeros and ones: sums stay in 16 bits, which is what lets this loop vectorise."""
+    for i in range(out.shape[0]):
+        line = out[i]
+        line[:] = 0
+        for tap in range(weights.shape[1]):
+            weight = weights[i, tap]
+            source = canvas[start[i] + tap]
+            for x in range(len(line)):
+                line[x] = np.uint16(line[x] + np.uint16(weight * np.uint16(source[x])))
+
+
+@njit(cache=True)
+def _resample_turned(lines: Any, start: Any, weights: Any, out: Any) -> None:
+    for j in range(out.shape[0]):
+        line = out[j]
+        line[:] = 0
+        for tap in range(weights.shape[1]):
+            weight = weights[j, tap]
+            source = lines[start[j] + tap]
+            for y in range(len(line)):
+                line[y] += weight * source[y]
+
+
+@njit(cache=True)
+def _resample_float(canvas: Any, start: Any, weights: Any, out: Any) -> None:
+    for i in range(out.shape[0]):
+        line = out[i]
+        line[:] = 0
+        for tap in range(weights.shape[1]):
+            weight = weights[i, tap]
+            source = canvas[start[i] + tap]
+            for x in range(len(line)):
+                line[x] += weight * source[x]

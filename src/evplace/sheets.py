@@ -1,0 +1,40 @@
+"""Contact sheets: some images of a traverse at a glance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.storage import new_file
+
+GAP = 4
+"""Grey pixels between two images."""
+
+
+def contact_sheet(
+    images: NDArray[np.uint8], path: str | Path, overwrite: bool = False, columns: int = 4, rows: int = 3
+) -> None:
+    """Write `columns` x `rows` images (n, h, w) or (n, h, w, 3), evenly chosen, as a .png; events dark."""
+    from PIL import Image
+
+    chosen = images[np.linspace(0, len(images) - 1, min(len(images), columns * rows)).astype(int)]
+    tiles = [_tile(image) for image in chosen]
+    height, width = tiles[0].shape[:2]
+    n_rows = -(-len(tiles) // columns)
+    sheet = np.full((n_rows * (height + GAP) - GAP, columns * (width + GAP) - GAP, 3), 200, np.uint8)
+    for index, tile in enumerate(tiles):
+        top, left = index // columns * (height + GAP), index % columns * (width + GAP)
+        sheet[top : top + height, left : left + width] = tile
+    with new_file(path, overwrite) as partial:
+        Image.fromarray(sheet).save(partial, "PNG")
+
+
+def _tile(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """An image as (h, w, 3); event images as ink on paper, at least 160 pixels wide."""
+    if image.ndim == 2 or image.shape[2] != 3:
+        grey = image if image.ndim == 2 else image.max(axis=2)
+        image = np.repeat(255 - grey[..., None], 3, axis=2)
+    zoom = max(1, 160 // image.shape[1])
+    return image.repeat(zoom, axis=0).repeat(zoom, axis=1)

@@ -1,0 +1,58 @@
+"""sad and ncc against plain twins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from evplace.errors import SettingsError
+from evplace.scorers.ncc import NccScorer, Settings, _reduction
+from evplace.scorers.sad import SadScorer
+
+Images = NDArray[np.uint8]
+
+
+def images(n: int, shape: tuple[int, ...], seed: int = 0) -> Images:
+    return np.random.default_rng(seed).integers(0, 256, (n, *shape), np.uint8)
+
+
+@pytest.mark.parametrize("shape", [(9, 16), (9, 16, 3)])
+def test_sad_is_the_negated_mean_difference(shape: tuple[int, ...]) -> None:
+    references, queries = images(6, shape), images(4, shape, seed=1)
+    wanted = [[-np.abs(q.astype(int) - r).mean() for r in references] for q in queries]
+    np.testing.assert_allclose(SadScorer(references).rows(queries), wanted, rtol=1e-6)
+
+
+@pytest.mark.parametrize("log", [False, True])
+def test_ncc_without_blur_or_reduction_is_pearsons_correlation(log: bool) -> None:
+    references, queries = images(6, (7, 7)), images(4, (7, 7), seed=1)
+    rows = NccScorer(references, Settings(sigma=0, log=log)).rows(queries)
+    flat = [block.reshape(len(block), -1).astype(float) for block in (queries, references)]
+    a, b = (np.log1p(block) if log else block for block in flat)
+    np.testing.assert_allclose(rows, np.corrcoef(a, b)[:4, 4:], atol=1e-5)
+
+
+def test_ncc_ignores_brightness_and_contrast_and_finds_itself() -> None:
+    references = images(6, (90, 160)) // 2
+    scorer = NccScorer(references, Settings())
+    rows = scorer.rows((references * 1.5 + 20).astype(np.uint8))
+    assert rows.argmax(axis=1).tolist() == list(range(6))
+    np.testing.assert_allclose(np.diag(rows), 1, atol=1e-3)
+
+
+def test_ncc_of_an_image_without_contrast_is_nothing() -> None:
+    rows = NccScorer(images(3, (20, 30)), Settings()).rows(np.full((1, 20, 30), 7, np.uint8))
+    assert (rows == 0).all()
+
+
+def test_the_reduction_keeps_means() -> None:
+    for n_in, n_out, sigma in [(90, 22, 2.0), (7, 7, 2.0), (5, 5, 0.0), (160, 40, 50.0)]:
+        matrix = _reduction(n_in, n_out, sigma)
+        assert matrix.shape == (n_out, n_in)
+        np.testing.assert_allclose(matrix.sum(axis=1), 1, atol=1e-6)
+
+
+def test_settings_that_cannot_be_are_refused() -> None:
+    with pytest.raises(SettingsError):
+        Settings(sigma=-1)

@@ -1,0 +1,78 @@
+"""Maps on disk: what is saved comes back; a changed byte, a missing file, another folder are told."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from evplace.errors import OutputError, PlaceMapError, SettingsError
+from evplace.placemap import PlaceMap
+from evplace.places import PlaceGrid, PlaceRuns
+from evplace.scorers import checked_settings, open_scorer
+from evplace.training import train
+from evplace.traverse import Traverse
+
+
+@pytest.mark.parametrize("kind", ["image_map", "network_map"])
+def test_a_saved_map_answers_as_before(
+    kind: str, request: pytest.FixtureRequest, night: Traverse, tmp_path: Path
+) -> None:
+    learned: PlaceMap = request.getfixturevalue(kind)
+    learned.save(tmp_path / "street.evp")
+    loaded = PlaceMap.load(tmp_path / "street.evp")
+    assert loaded.settings == learned.settings
+    assert loaded.places.to_dict() == learned.places.to_dict()
+    np.testing.assert_array_equal(loaded.items.position, learned.items.position)
+    wanted = open_scorer(learned).rows(night.images)
+    np.testing.assert_array_equal(open_scorer(loaded).rows(night.images), wanted)
+
+
+def test_a_map_without_positions(day: Traverse, tmp_path: Path) -> None:
+    lost = Traverse(day.images, day.t_us, day.counts, None, day.info)
+    train(lost, PlaceRuns(len(day), every=10), scorer="sad").save(tmp_path / "map")
+    loaded = PlaceMap.load(tmp_path / "map")
+    assert loaded.items.place.tolist() == [n // 10 for n in range(len(day))]
+    assert np.isnan(loaded.items.position).all()
+
+
+@pytest.mark.parametrize("name", ["references.npy", "map.json", "items.npy", "SHA256SUMS"])
+def test_a_flipped_byte_is_found(image_map: PlaceMap, tmp_path: Path, name: str) -> None:
+    image_map.save(tmp_path / "map")
+    file = tmp_path / "map" / name
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+    with pytest.raises(PlaceMapError, match=r"damaged|SHA256SUMS|lacks"):
+        PlaceMap.load(tmp_path / "map")
+
+
+def test_a_missing_part_is_told(network_map: PlaceMap, tmp_path: Path) -> None:
+    network_map.save(tmp_path / "map")
+    (tmp_path / "map" / "network.onnx").unlink()
+    with pytest.raises(PlaceMapError, match=r"lacks network\.onnx"):
+        PlaceMap.load(tmp_path / "map")
+    with pytest.raises(PlaceMapError, match="is no map"):
+        PlaceMap.load(tmp_path)
+
+
+def test_an_existing_map_is_not_overwritten_unasked(image_map: PlaceMap, tmp_path: Path) -> None:
+    image_map.save(tmp_path / "map")
+    with pytest.raises(OutputError, match="exists"):
+        image_map.save(tmp_path / "map")
+    image_map.save(tmp_path / "map", overwrite=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["map"]
+
+
+def test_scorers_and_their_settings_are_checked(day: Traverse, places: PlaceGrid) -> None:
+    assert checked_settings("ncc", {"sigma": 1})["sigma"] == 1.0
+    with pytest.raises(SettingsError, match="did you mean 'sigma'"):
+        checked_settings("ncc", {"sigmas": 1})
+    with pytest.raises(SettingsError, match="known are ncc, network, sad"):
+        checked_settings("nearest", {})
+    known = train(day, places, scorer="sad")
+    unknown = dataclasses.replace(known, scorer="nearest")
+    with pytest.raises(PlaceMapError, match="nearest"):
+        open_scorer(unknown)

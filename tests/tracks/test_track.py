@@ -1,0 +1,72 @@
+"""Positions at given times, and headings from movement."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evplace.errors import TrackError
+from evplace.tracks import Track
+
+SECOND = 1_000_000
+
+
+def straight(seconds: list[float], speed: float = 10.0) -> Track:
+    times = np.array(seconds)
+    return Track.local(times * SECOND, np.column_stack([np.zeros(len(times)), speed * times]))
+
+
+def test_positions_are_linear_between_fixes() -> None:
+    here = straight([0, 1, 2]).at([500_000, 1_250_000, 2_000_000])
+    assert here.northing.tolist() == [5.0, 12.5, 20.0]
+    assert here.heading_deg.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_nothing_is_guessed_beyond_the_ends_or_across_gaps() -> None:
+    track = straight([0, 1, 2.5, 3])
+    here = track.at(np.array([-1, 0, 1, 1.5, 2.5, 2.75, 3, 3.000001]) * SECOND)
+    assert here.known.tolist() == [False, True, True, False, True, True, True, False]
+    assert track.at([1_500_000], max_gap_s=2).known.all()
+
+
+def test_a_jump_of_more_than_a_cell_is_a_gap() -> None:
+    assert not straight([0, 1], speed=21).at([500_000]).known.any()
+    assert straight([0, 1], speed=21).at([500_000], max_gap_m=30).known.all()
+
+
+@given(
+    st.lists(st.integers(0, 20_000_000), min_size=1, max_size=30, unique=True).map(sorted),
+    st.lists(st.integers(-1_000_000, 21_000_000), max_size=30),
+)
+def test_every_answer_lies_between_its_neighbours(times: list[int], wanted: list[int]) -> None:
+    track = Track.local(times, np.column_stack([np.cumsum(np.arange(len(times))), np.zeros(len(times))]))
+    here = track.at(wanted)
+    for t_us, known, x in zip(wanted, here.known, here.easting, strict=True):
+        after = int(np.searchsorted(times, t_us))
+        exact = after < len(times) and times[after] == t_us
+        inside = 0 < after < len(times) and times[after] - times[after - 1] <= SECOND
+        inside &= 0 < after < len(times) and track.easting[after] - track.easting[after - 1] <= 20
+        assert known == (exact or inside)
+        if known:
+            low = track.easting[after if exact else after - 1]
+            assert low <= x <= track.easting[after]
+
+
+def test_headings_come_from_movement_that_is_fast_enough() -> None:
+    xy = [[0, 0], [10, 0], [20, 0], [20.1, 0], [20.2, 0]]
+    assert Track.local(np.arange(5) * SECOND, xy).heading_deg[:2].tolist() == [90.0, 90.0]
+    assert np.isnan(Track.local(np.arange(5) * SECOND, xy).heading_deg[4])
+
+
+def test_headings_turn_the_short_way_round() -> None:
+    track = Track.local([0, SECOND], [[0, 0], [1, 0]], heading_deg=[350, 10])
+    assert track.at([500_000]).heading_deg[0] % 360 == pytest.approx(0, abs=1e-9)
+
+
+def test_wrong_shapes_and_orders_are_refused() -> None:
+    with pytest.raises(TrackError, match="shape"):
+        Track.local([0, 1], [[0, 0]])
+    with pytest.raises(TrackError, match="increase"):
+        Track.local([1, 1], [[0, 0], [0, 0]])
