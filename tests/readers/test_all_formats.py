@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import subprocess
@@ -159,3 +160,24 @@ def test_memory_is_bounded(tmp_path: Path) -> None:
     events, megabytes = map(int, answer.stdout.split())
     assert events == 20_000_000
     assert megabytes < 400
+
+
+@formats
+def test_a_format_forced_on_something_else_is_an_error_or_gives_nothing(form: str, tmp_path: Path) -> None:
+    path = tmp_path / "letter"
+    path.write_bytes(b"Dear reader, this is no recording.\n" * 20)
+    delivered = 0
+    with contextlib.suppress(RecordingError):
+        delivered = sum(map(len, open_recording(path, SIZE, format=form, time_unit="us").packets()))
+    # Formats of bare words take any bytes for words; what they make of these is out of range or untimed.
+    assert delivered < 50
+    with pytest.raises(RecordingError):
+        open_recording(tmp_path, SIZE, format=form, time_unit="us")
+
+
+def test_a_recording_that_vanishes_is_an_error(tmp_path: Path) -> None:
+    path = MAKERS["evt2"](tmp_path, some_events(50))
+    recording = open_recording(path)
+    path.unlink()
+    with pytest.raises(DamagedRecordingError, match="No such file"):
+        list(recording.packets())
