@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -103,3 +105,22 @@ def test_a_decoder_that_hangs_or_crashes_is_an_error(tmp_path: Path, monkeypatch
     monkeypatch.setattr(_isolated, "_limit_memory", None)
     with pytest.raises(DamagedRecordingError, match="crashed"):
         _isolated.isolated("no_such_reader", path, _isolated.Hints())
+
+
+def test_a_filter_that_is_missing_is_named(tmp_path: Path) -> None:
+    """In a process of its own, as filters stay known to a process once they are."""
+    hdf5plugin: Any = pytest.importorskip("hdf5plugin")
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        group = file.create_group("events")
+        for name, rows_of in (("t_us", SOME.t_us), ("x", SOME.x), ("y", SOME.y), ("p", SOME.p)):
+            group.create_dataset(name, data=rows_of, **hdf5plugin.Blosc(cname="zstd"))
+    assert np.array_equal(read(tmp_path / "b.h5").t_us, SOME.t_us)
+    code = (
+        "import sys; from pathlib import Path; from evplace.readers import Hints, _hdf5\n"
+        "_hdf5._load_filters = lambda: None\n"
+        "_hdf5.open_here(Path(sys.argv[1]), Hints())"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "b.h5")], capture_output=True, text=True
+    )
+    assert "pip install 'evplace[hdf5]'" in answer.stderr

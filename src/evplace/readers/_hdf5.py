@@ -12,6 +12,9 @@ Any other group or table with the four fields is read as well; its unit of time 
 
 from __future__ import annotations
 
+import contextlib
+import importlib
+import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -51,10 +54,10 @@ def open_here(path: Path, hints: Hints) -> Source:
                     f"{path} is an HDF5 file without events (t, x, y, p): it holds {keys or 'nothing'}"
                 )
             layout = layouts[0]
+            _need_filters(path, file, layout)
             unit, notes = _unit(file, layout, hints)
             offset, size = _offset(file, layout), _size(file, layout)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
-        _explain_filter(error)
         raise RecordingError(f"{path} is a damaged HDF5 file: {_one_line(error)}") from error
     if len(layouts) > 1:
         others = ", ".join(other.place for other in layouts[1:])
@@ -63,17 +66,24 @@ def open_here(path: Path, hints: Hints) -> Source:
 
 
 def _load_filters() -> None:
-    try:
-        import hdf5plugin  # noqa: F401  # importing it is what makes the filters known
-    except ImportError:
-        return
+    with contextlib.suppress(ImportError):
+        importlib.import_module("hdf5plugin")  # importing it is what makes its filters known
 
 
-def _explain_filter(error: Exception) -> None:
-    if "filter" in str(error) and "plugin" in str(error).lower():
-        raise MissingExtraError(
-            "hdf5plugin", "hdf5", "this HDF5 file is compressed, and reading it"
-        ) from error
+def _need_filters(path: Path, file: h5py.File, layout: _Layout) -> None:
+    """Whether all that the events are packed with can be unpacked here; the error says what is missing."""
+    group = file[layout.place]
+    for table in [group] if layout.table else [group[name] for name in layout.fields.values()]:
+        steps = table.id.get_create_plist()
+        for code, *_, name in (steps.get_filter(number) for number in range(steps.get_nfilters())):
+            if h5py.h5z.filter_avail(code):
+                continue
+            if "hdf5plugin" not in sys.modules:
+                raise MissingExtraError("hdf5plugin", "hdf5", f"reading {path}")
+            named = name.decode("ascii", "replace")
+            raise RecordingError(
+                f"{path} is packed with the HDF5 filter {code} ({named}), which is not known here"
+            )
 
 
 def _one_line(error: Exception) -> str:
@@ -157,7 +167,6 @@ def _blocks(path: Path, layout: _Layout, unit: str, offset_us: int) -> Iterator[
                 block = _columns.block(part["t"], part["x"], part["y"], part["p"], unit)
                 yield block if offset_us == 0 else block._replace(t_us=block.t_us + offset_us)
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
-        _explain_filter(error)
         raise DamagedRecordingError(f"{path} breaks off: {_one_line(error)}") from error
 
 
