@@ -13,14 +13,15 @@ from evplace.matchers._viterbi import Viterbi
 from evplace.matchers.hmm import Settings, log_odds, moving_mean, without_leading
 
 
-def plain_viterbi(gains, low, high, stay, jump) -> list[int]:
+def plain_viterbi(gains, low, moves, jump) -> list[int]:
     """The best path by looking at every parent of every cell."""
     queries, items = gains.shape
     total, parents = gains[0].copy(), []
     for q in range(1, queries):
         before, total, row = total, np.empty(items), []
         for r in range(items):
-            near = [(before[p] + stay, -p) for p in range(items) if low <= r - p <= high]
+            steps = [(p, r - p - low) for p in range(items)]
+            near = [(before[p] + moves[step], -p) for p, step in steps if 0 <= step < len(moves)]
             best = max(near, default=(-np.inf, 0))
             leap = (before.max() + jump, -int(before.argmax()))
             best = leap if leap[0] > best[0] else best
@@ -48,9 +49,10 @@ def test_equals_the_plain_search(queries, items, low, spread, jump, seed, ties) 
     gains = rng.integers(0, 4, (queries, items)) * 1.0 if ties else rng.normal(size=(queries, items))
     if np.isinf(jump) and not low <= 0 <= low + spread:
         jump = -9.0
-    search = Viterbi(low, low + spread, -0.25, jump)
+    moves = rng.integers(-3, 0, spread + 1) * 0.25
+    search = Viterbi(low, moves, jump)
     search.extend(gains)
-    assert search.trace().tolist() == plain_viterbi(gains, low, low + spread, -0.25, jump)
+    assert search.trace().tolist() == plain_viterbi(gains, low, moves, jump)
 
 
 @given(st.integers(2, 5), st.integers(2, 5), st.integers(0, 999))
@@ -133,6 +135,7 @@ def test_moving_mean_is_shorter_at_the_ends() -> None:
         ("dp", {"K": 40000}, "from 1 to"),
         ("hmm", {"v_min": 4}, "v_min <= v_max"),
         ("hmm", {"jump": 0.0}, "no probability"),
+        ("hmm", {"steady": 1.5}, "no probability"),
         ("hmm", {"temperature": 0.0}, "temperature above 0"),
         ("hmm", {"R": 3}, "even number"),
     ],
