@@ -63,7 +63,7 @@ def average_precision(points: Iterator[tuple[float, Path]], truth: np.ndarray) -
             found = (right_of(path, truth) & path.accepted).sum()
             curve.add((found / seen, found / path.accepted.sum()))
     area, before = 0.0, 0.0
-    for recall, precision in sorted(curve):
+    for recall, precision in sorted(curve, key=lambda point: (point[0], -point[1])):
         area, before = area + (recall - before) * precision, recall
     return area
 

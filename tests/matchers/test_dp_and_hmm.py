@@ -107,6 +107,13 @@ def test_hmm_follows_a_drive_and_its_jump(emission, drop) -> None:
     assert path.accepted.mean() > 0.9
 
 
+def test_hmm_is_told_of_another_speed() -> None:
+    distances = drive(jump_at=90)[0][::2]
+    model = open_matcher("hmm", speed=2.0)
+    model.extend(-distances)
+    assert (np.abs(model.path().item - 2 * np.arange(45)) <= 1).mean() > 0.9
+
+
 def test_hmm_takes_the_networks_probabilities() -> None:
     p = np.random.default_rng(0).dirichlet(np.full(30, 0.1), 50)
     odds = log_odds(p, Settings(emission="probabilities"))
@@ -135,6 +142,7 @@ def test_moving_mean_is_shorter_at_the_ends() -> None:
         ("dp", {"K": 40000}, "from 1 to"),
         ("hmm", {"v_min": 4}, "v_min <= v_max"),
         ("hmm", {"jump": 0.0}, "no probability"),
+        ("hmm", {"speed": 4.0}, "between v_min and v_max"),
         ("hmm", {"steady": 1.5}, "no probability"),
         ("hmm", {"temperature": 0.0}, "temperature above 0"),
         ("hmm", {"R": 3}, "even number"),

@@ -28,9 +28,11 @@ class Settings:
     """Fewest references that one query moves on; 0 lets the query stand, less than 0 lets it turn back."""
     v_max: int = 3
     """Most references that one query moves on."""
+    speed: float = 1.0
+    """References that a query moves on by where nothing is unusual: the drives' speeds and frame rates."""
     steady: float = 0.9
-    """Probability that a query moves on by one reference, the drives being alike in speed; the rest is
-    spread evenly from v_min to v_max. 0 where speeds are quite unknown."""
+    """Probability that a query moves on at `speed`, or by the whole numbers next to it; the rest is spread
+    evenly from v_min to v_max. 0 where the speed is quite unknown."""
     jump: float = 1e-3
     """Probability of a jump to any reference at all, at each query."""
     emission: Literal["contrast", "softmax", "probabilities"] = "contrast"
@@ -56,6 +58,8 @@ class Settings:
             raise SettingsError(f"jump = {self.jump} is no probability between 0 and 1")
         if not 0 <= self.steady <= 1:
             raise SettingsError(f"steady = {self.steady} is no probability from 0 to 1")
+        if not self.v_min <= self.speed <= self.v_max:
+            raise SettingsError(f"speed = {self.speed} does not lie between v_min and v_max")
         if self.temperature <= 0 or self.length < 1 or self.drop < 0:
             raise SettingsError("take a temperature above 0, a length from 1, and drop from 0")
         if self.R < 2 or self.R % 2:
@@ -120,8 +124,8 @@ def transitions(settings: Settings, items: int) -> Viterbi:
     """A search from anywhere, that moves on as the settings say."""
     s = settings
     steps = np.arange(s.v_min, s.v_max + 1)
-    steady = s.steady if s.v_min <= 1 <= s.v_max else 0.0
-    probability = (1 - s.jump) * (steady * (steps == 1) + (1 - steady) / len(steps)) + s.jump / items
+    usual = s.steady * np.maximum(0, 1 - np.abs(steps - s.speed))
+    probability = (1 - s.jump) * (usual + (1 - s.steady) / len(steps)) + s.jump / items
     return Viterbi(s.v_min, np.log(probability), float(np.log(s.jump / items)))
 
 
