@@ -88,9 +88,10 @@ def bench_sad(items: int, rounds: int) -> None:
 
 def bench_local(frames: int, rounds: int) -> None:
     p = 0.2 * np.random.default_rng(0).dirichlet(np.full(104, 0.05), frames).astype(np.float32)
-    p[np.arange(frames), np.arange(frames) // 14 % 104] += 0.8
-    p[:: frames // 50] = 1 / 104  # now and then lost, until a place scores above tau1
-    p[7 :: frames // 50] = np.eye(104, dtype=np.float32)[50]
+    at = np.arange(frames) // 14 % 104
+    p[np.arange(frames), at] += 0.8
+    p[::50] = 0.001  # now and then lost, until a place scores above tau1
+    p[3::50, at[3::50]] = 0.995
     assert (whole("local", p) == plain.algorithm_1(p)).all()
     times = alternate({"evplace": lambda: whole("local", p), "numpy": lambda: plain.algorithm_1(p)}, rounds)
     report(f"Algorithm 1, {frames} frames of 104 places, a frame", times, 1e-6 * frames, "us")

@@ -13,14 +13,15 @@ from evplace.matchers._viterbi import Viterbi
 from evplace.matchers.hmm import Settings, log_odds, moving_mean, without_leading
 
 
-def plain_viterbi(gains, low, high, stay, jump) -> list[int]:
+def plain_viterbi(gains, low, moves, jump) -> list[int]:
     """The best path by looking at every parent of every cell."""
     queries, items = gains.shape
     total, parents = gains[0].copy(), []
     for q in range(1, queries):
         before, total, row = total, np.empty(items), []
         for r in range(items):
-            near = [(before[p] + stay, -p) for p in range(items) if low <= r - p <= high]
+            steps = [(p, r - p - low) for p in range(items)]
+            near = [(before[p] + moves[step], -p) for p, step in steps if 0 <= step < len(moves)]
             best = max(near, default=(-np.inf, 0))
             leap = (before.max() + jump, -int(before.argmax()))
             best = leap if leap[0] > best[0] else best
@@ -48,9 +49,10 @@ def test_equals_the_plain_search(queries, items, low, spread, jump, seed, ties) 
     gains = rng.integers(0, 4, (queries, items)) * 1.0 if ties else rng.normal(size=(queries, items))
     if np.isinf(jump) and not low <= 0 <= low + spread:
         jump = -9.0
-    search = Viterbi(low, low + spread, -0.25, jump)
+    moves = rng.integers(-3, 0, spread + 1) * 0.25
+    search = Viterbi(low, moves, jump)
     search.extend(gains)
-    assert search.trace().tolist() == plain_viterbi(gains, low, low + spread, -0.25, jump)
+    assert search.trace().tolist() == plain_viterbi(gains, low, moves, jump)
 
 
 @given(st.integers(2, 5), st.integers(2, 5), st.integers(0, 999))
@@ -105,6 +107,13 @@ def test_hmm_follows_a_drive_and_its_jump(emission, drop) -> None:
     assert path.accepted.mean() > 0.9
 
 
+def test_hmm_is_told_of_another_speed() -> None:
+    distances = drive(jump_at=90)[0][::2]
+    model = open_matcher("hmm", speed=2.0)
+    model.extend(-distances)
+    assert (np.abs(model.path().item - 2 * np.arange(45)) <= 1).mean() > 0.9
+
+
 def test_hmm_takes_the_networks_probabilities() -> None:
     p = np.random.default_rng(0).dirichlet(np.full(30, 0.1), 50)
     odds = log_odds(p, Settings(emission="probabilities"))
@@ -133,6 +142,8 @@ def test_moving_mean_is_shorter_at_the_ends() -> None:
         ("dp", {"K": 40000}, "from 1 to"),
         ("hmm", {"v_min": 4}, "v_min <= v_max"),
         ("hmm", {"jump": 0.0}, "no probability"),
+        ("hmm", {"speed": 4.0}, "between v_min and v_max"),
+        ("hmm", {"steady": 1.5}, "no probability"),
         ("hmm", {"temperature": 0.0}, "temperature above 0"),
         ("hmm", {"R": 3}, "even number"),
     ],
