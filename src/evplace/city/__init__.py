@@ -12,6 +12,7 @@ from evplace.city.conditions import CONDITIONS
 from evplace.city.film import CityFrame, Film, GeoPose
 from evplace.city.generation import Progress, generate
 from evplace.city.plan import VERSION, CitySettings
+from evplace.city.previewing import moving_preview, preview
 from evplace.city.town import Town, build_town
 
 __all__ = [
@@ -25,4 +26,6 @@ __all__ = [
     "Town",
     "build_town",
     "generate",
+    "moving_preview",
+    "preview",
 ]

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from threading import Lock
@@ -18,6 +18,7 @@ from evplace import errors
 from evplace.city.plan import VERSION, CitySettings, drive_name
 from evplace.city.recording import record_drive
 from evplace.city.town import build_town
+from evplace.city.warming import warm
 from evplace.errors import EvplaceError, OutputError
 from evplace.settings import to_dict
 from evplace.storage import read_json, write_json
@@ -44,8 +45,11 @@ def generate(
     settings: CitySettings | None = None,
     workers: int | None = None,
     progress: Report | None = None,
+    drives: Sequence[tuple[str, int]] | None = None,
 ) -> list[Path]:
     """Make every drive of `settings` under `out`; returns their folders, `<condition>-<path>`.
+
+    `drives` names (condition, path) pairs of their own, instead of every condition on every path.
 
     Each holds a traverse for each sensor, the traverse `colour` (same times, same truth), and poses.npy
     (n, 6): easting, northing, height in metres, yaw, pitch, roll in radians. `workers` processes are used
@@ -56,8 +60,9 @@ def generate(
     """
     folder, chosen = Path(out), settings or CitySettings()
     _claim(folder, chosen)
-    names = [drive_name(name, path) for name, path in chosen.drives()]
-    todo = [pair for pair, name in zip(chosen.drives(), names, strict=True) if not (folder / name).is_dir()]
+    pairs = chosen.drives() if drives is None else list(drives)
+    names = [drive_name(name, path) for name, path in pairs]
+    todo = [pair for pair, name in zip(pairs, names, strict=True) if not (folder / name).is_dir()]
     meter = _Meter([drive_name(*pair) for pair in todo], progress)
     count = min(workers or os.cpu_count() or 1, len(todo))
     if count > 1:
@@ -118,15 +123,15 @@ def _in_processes(
 ) -> None:
     """Run `python -m evplace.city.worker` for each drive, `count` at a time.
 
-    Not multiprocessing: that would run the caller's own script again in each process. The first process
-    starts alone until it renders, so that the loops are compiled once, not `count` times.
+    Not multiprocessing: that would run the caller's own script again in each process. The loops are
+    compiled here first, so that it is done once, not `count` times.
     """
     running: list[subprocess.Popen[str]] = []
 
     def make(pair: tuple[str, int]) -> None:
         _work(folder, settings, pair, running, meter.of(drive_name(*pair)))
 
-    _compile(settings)
+    warm(settings)
     try:
         with ThreadPoolExecutor(count) as pool:
             for _ in pool.map(make, todo):
@@ -134,13 +139,6 @@ def _in_processes(
     finally:
         for process in running:
             process.kill()
-
-
-def _compile(settings: CitySettings) -> None:
-    """Render a moment of each condition, so that the compiled loops lie on the disk for all processes."""
-    from evplace.city.warming import warm
-
-    warm(settings)
 
 
 def _work(
