@@ -97,6 +97,28 @@ def test_equals_the_plain_search(K, alpha, m, relocalise, items, queries, seed) 
     )
 
 
+@settings(max_examples=100)
+@given(
+    st.integers(1, 4),
+    st.sampled_from([0.0, 0.3, 1.0]),
+    st.sampled_from(["all", "none"]),
+    st.sampled_from([0, 2, 5]),
+    st.integers(1, 12),
+    st.integers(0, 9999),
+)
+def test_ties_and_impossible_nodes_always_give_a_path_of_allowed_moves(
+    K, alpha, relocalise, memory, items, seed
+) -> None:
+    similarities = np.random.default_rng(seed).integers(0, 3, (30, items)) / 2
+    graph = open_matcher("graph", K=K, alpha=alpha, relocalise=relocalise, memory=memory)
+    graph.extend(similarities)
+    item = graph.path().item
+    assert len(item) == 30
+    assert ((item >= 0) & (item < items)).all()
+    if relocalise == "none":
+        assert (np.abs(np.diff(item)) <= K).all()
+
+
 def test_a_short_memory_keeps_two_rows_and_long_ones_change_nothing() -> None:
     similarities = np.random.default_rng(3).uniform(0.1, 1, (300, 30))
     paths = []

@@ -2,7 +2,7 @@
 
 "Visual place recognition using HMM sequence matching" (IROS 2014) says: similarity probabilities of locally
 contrasted images, transitions that limit the velocity, a path that may be discontinuous, and a matrix of
-reduced rank for scoring. All numbers, the uniform transitions, the softmax and the score are ours.
+reduced rank for scoring. All numbers, the form of the transitions, the softmax and the score are ours.
 """
 
 from __future__ import annotations
