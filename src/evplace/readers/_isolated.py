@@ -24,7 +24,7 @@ from evplace import errors
 from evplace.errors import DamagedRecordingError, EvplaceError
 from evplace.readers._source import Block, Hints, Source
 
-PATIENCE_S = 10.0
+PATIENCE_S = 8.0
 """Seconds in which a block of events must come; beyond that the child hangs."""
 MEMORY = 4 << 30
 """Bytes of address space that the child may take, where the system can limit it; a block needs far less."""
