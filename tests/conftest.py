@@ -17,7 +17,7 @@ from evplace.places import PlaceGrid
 from evplace.settings import to_dict
 from evplace.stream import event_images
 from evplace.tracks import Track
-from evplace.train import train
+from evplace.training import train
 from evplace.traverse import Traverse
 from evplace.windows import WindowSettings
 

@@ -18,9 +18,9 @@ from evplace.evaluation import (
     Result,
     average_precision,
     compare,
-    evaluate,
     gallery_spacing,
     hits_at,
+    measure,
     precision_recall,
 )
 from evplace.matchers import Path as Answers
@@ -43,7 +43,7 @@ SIX = known([[1, 0], [1, 0], [0, 1], [0, 1], [0, 0], [0, 0]])
 
 
 def test_every_figure_of_a_closed_case() -> None:
-    figures = evaluate(answers([0, 1, 1, -1, 0, -1], score=[5, 4, 3, np.nan, 2, np.nan]), SIX).figures
+    figures = measure(answers([0, 1, 1, -1, 0, -1], score=[5, 4, 3, np.nan, 2, np.nan]), SIX).figures
     assert [figures[key] for key in ("tp", "fp", "fn", "tn")] == [2, 2, 1, 1]
     assert figures["accuracy"] == 3 / 6
     assert figures["accuracy_seen"] == 2 / 4
@@ -57,19 +57,19 @@ def test_every_figure_of_a_closed_case() -> None:
 
 
 def test_nothing_accepted_has_no_precision() -> None:
-    figures = evaluate(answers([-1] * 6), SIX).figures
+    figures = measure(answers([-1] * 6), SIX).figures
     assert (figures["precision"], figures["recall"], figures["accuracy"]) == (None, 0, 2 / 6)
     assert figures["average_precision"] is None
 
 
 def test_nothing_seen_has_no_recall() -> None:
-    figures = evaluate(answers([0, -1]), known([[0], [0]])).figures
+    figures = measure(answers([0, -1]), known([[0], [0]])).figures
     assert (figures["recall"], figures["accuracy"], figures["average_precision"]) == (None, 0.5, None)
 
 
 def test_queries_without_position_are_left_out_and_counted() -> None:
     xy = np.array([[5.0, 5.0], [np.nan, np.nan], [500.0, 5.0]])
-    result = evaluate(answers([0, 0, -1]), truth.by_cells(xy, [[5, 5], [25, 5]]), positions=[[5, 5], [25, 5]])
+    result = measure(answers([0, 0, -1]), truth.by_cells(xy, [[5, 5], [25, 5]]), positions=[[5, 5], [25, 5]])
     assert (result.figures["queries"], result.figures["left_out"], result.figures["judged"]) == (3, 1, 2)
     assert result.figures["accuracy"] == 1
     assert result.figures["gallery_spacing_m"] == 20
@@ -121,37 +121,37 @@ def test_ties_against_every_order(row: list[tuple[float, bool]]) -> None:
 def test_recall_at_n_with_both_denominators() -> None:
     scores = np.array([[3.0, 2, 1], [1, 2, 3], [1, 1, 1]])
     right = known([[1, 0, 0], [1, 0, 0], [0, 0, 0]])
-    figures = evaluate(answers([0, 2, 0]), right, scores).figures
+    figures = measure(answers([0, 2, 0]), right, scores).figures
     assert (figures["recall@1"], figures["recall@1_seen"], figures["recall@5"]) == (1 / 3, 1 / 2, 2 / 3)
     assert figures["recall@1_worst_ties"] == figures["recall@1_best_ties"] == 1 / 3
 
 
 def test_equal_scores_are_chance_within_a_wide_bracket() -> None:
-    figures = evaluate(answers([0] * 6), SIX, np.zeros((6, 2))).figures
+    figures = measure(answers([0] * 6), SIX, np.zeros((6, 2))).figures
     assert figures["recall@1"] == figures["chance"]
     assert (figures["recall@1_worst_ties"], figures["recall@1_best_ties"]) == (0, 4 / 6)
 
 
 def test_scores_that_are_not_numbers_never_hit() -> None:
-    figures = evaluate(answers([-1] * 6), SIX, np.full((6, 2), np.nan, np.float32)).figures
+    figures = measure(answers([-1] * 6), SIX, np.full((6, 2), np.nan, np.float32)).figures
     assert [figures[f"recall@{n}"] for n in RECALLS_AT] == [0, 0, 0, 0]
 
 
 def test_parts_that_do_not_fit_are_refused() -> None:
     with pytest.raises(EvaluationError, match="5 answers do not fit a truth of 6 queries"):
-        evaluate(answers([0] * 5), SIX)
+        measure(answers([0] * 5), SIX)
     with pytest.raises(EvaluationError, match="the truth has 2"):
-        evaluate(answers([2] * 6), SIX)
+        measure(answers([2] * 6), SIX)
     with pytest.raises(EvaluationError, match="scores of shape"):
-        evaluate(answers([0] * 6), SIX, np.zeros((2, 6)))
+        measure(answers([0] * 6), SIX, np.zeros((2, 6)))
     with pytest.raises(EvaluationError, match="none of the 2 queries"):
-        evaluate(answers([0, 0]), truth.by_radius(np.full((2, 2), np.nan), [[0, 0]]))
+        measure(answers([0, 0]), truth.by_radius(np.full((2, 2), np.nan), [[0, 0]]))
 
 
 def test_a_result_survives_the_disk(tmp_path: Path) -> None:
     scores = np.arange(12, dtype=np.float32).reshape(6, 2)
     given_answers = answers([0, 1, 1, -1, 0, -1], score=[0.1, 1 / 3, np.inf, np.nan, -2, 3])
-    result = evaluate(given_answers, SIX, scores, t_us=np.arange(6) * 10, settings={"matcher": {"K": 5}})
+    result = measure(given_answers, SIX, scores, t_us=np.arange(6) * 10, settings={"matcher": {"K": 5}})
     result.save(tmp_path / "night.result", with_scores=True)
     again = Result.load(tmp_path / "night.result")
     assert again.figures == result.figures
@@ -169,7 +169,7 @@ def test_a_result_survives_the_disk(tmp_path: Path) -> None:
 
 def test_compare_reads_folders_and_shows_what_differs(tmp_path: Path) -> None:
     for K in (1, 5):
-        made = evaluate(answers([0] * 6), SIX, settings={"matcher": {"name": "local", "K": K}})
+        made = measure(answers([0] * 6), SIX, settings={"matcher": {"name": "local", "K": K}})
         made.save(tmp_path / f"k{K}")
     rows = compare([tmp_path / "k1", tmp_path / "k5", Result.load(tmp_path / "k5")])
     assert [row["result"] for row in rows] == ["k1", "k5", "3"]
@@ -190,7 +190,7 @@ def test_damaged_results_are_refused(tmp_path: Path) -> None:
         ("result.json", b"{}"),
         ("result.json", b"["),
     ]:
-        evaluate(answers([0] * 6), SIX).save(folder, overwrite=True)
+        measure(answers([0] * 6), SIX).save(folder, overwrite=True)
         (folder / name).write_bytes(content)
         with pytest.raises(EvaluationError, match="damaged"):
             Result.load(folder)
@@ -203,7 +203,7 @@ def test_real_techniques_against_a_plain_count(data: Path) -> None:
     assert len(tables) == 10
     for scores in tables.values():
         best = scores.argmax(axis=1)
-        result = evaluate(answers(best.tolist()), truth.by_frames(111, 111, 2), scores)
+        result = measure(answers(best.tolist()), truth.by_frames(111, 111, 2), scores)
         plain = np.mean(np.abs(best - np.arange(111)) <= 2)
         assert result.figures["accuracy"] == pytest.approx(plain)
         low, high = (result.figures[f"recall@1_{end}_ties"] for end in ("worst", "best"))

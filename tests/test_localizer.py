@@ -15,7 +15,7 @@ from evplace.events import Events
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid
-from evplace.train import train
+from evplace.training import train
 from evplace.traverse import Traverse
 
 

@@ -13,7 +13,7 @@ from evplace.errors import SettingsError, TraverseError
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid
 from evplace.scorers import open_scorer
-from evplace.train import PRESETS, TrainSettings, batches, train, train_network
+from evplace.training import PRESETS, TrainSettings, batches, train, train_network
 from evplace.traverse import Traverse
 
 torch = pytest.importorskip("torch", reason="the network needs the extra 'train'")

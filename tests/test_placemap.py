@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from evplace.errors import OutputError, PlaceMapError, SettingsError
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns
 from evplace.scorers import checked_settings, open_scorer
-from evplace.train import train
+from evplace.training import train
 from evplace.traverse import Traverse
 
 
@@ -71,6 +72,7 @@ def test_scorers_and_their_settings_are_checked(day: Traverse, places: PlaceGrid
         checked_settings("ncc", {"sigmas": 1})
     with pytest.raises(SettingsError, match="known are ncc, network, sad"):
         checked_settings("nearest", {})
-    unknown = PlaceMap("nearest", places, train(day, places, scorer="sad").items)
+    known = train(day, places, scorer="sad")
+    unknown = dataclasses.replace(known, scorer="nearest")
     with pytest.raises(PlaceMapError, match="nearest"):
         open_scorer(unknown)

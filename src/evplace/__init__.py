@@ -10,6 +10,25 @@ __version__ = "0.1.0"
 _PUBLIC = {
     "Events": "evplace.events",
     "EvplaceError": "evplace.errors",
+    "ImageSettings": "evplace.images",
+    "Localizer": "evplace.localizer",
+    "Match": "evplace.localizer",
+    "PlaceGrid": "evplace.places",
+    "PlaceMap": "evplace.placemap",
+    "PlaceRuns": "evplace.places",
+    "Recording": "evplace.readers",
+    "Result": "evplace.evaluation",
+    "Track": "evplace.tracks",
+    "TrainSettings": "evplace.training",
+    "Traverse": "evplace.traverse",
+    "WindowSettings": "evplace.windows",
+    "compare": "evplace.evaluation",
+    "evaluate": "evplace.trial",
+    "event_image": "evplace.images",
+    "open_recording": "evplace.readers",
+    "open_track": "evplace.tracks",
+    "open_traverse": "evplace.capture",
+    "train": "evplace.training",
 }
 """Public name -> module. Loaded on first use, so that `import evplace` costs numpy at most."""
 

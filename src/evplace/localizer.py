@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from evplace import settings
 from evplace.errors import PlaceMapError, RecordingError
 from evplace.events import Events
 from evplace.images import ImageSettings
-from evplace.matchers import Answer, Matcher, Path, open_matcher
+from evplace.matchers import Answer, Matcher, Path, open_matcher, resolved_settings
 from evplace.placemap import PlaceMap
 from evplace.scorers import Rows, open_scorer
 from evplace.stream import EventImage, EventImages
@@ -64,6 +64,12 @@ class Localizer:
         self.scorer = open_scorer(place_map)
         self._recipe = (matcher, preset, matcher_settings)
         self.reset()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The resolved settings of the matcher, with its name."""
+        name, preset, values = self._recipe
+        return {"name": name} | resolved_settings(name, preset, **values)
 
     def reset(self) -> None:
         """Forget the drive so far."""

@@ -1,8 +1,9 @@
 """PlaceMap: what learning a route leaves behind, and all that localising needs.
 
-On disk it is a folder: map.json (scorer, places, settings), items.npy (where each map item is), the network
-as weights.safetensors and network.onnx, or the reference images as references.npy, and SHA256SUMS over all
-of them, which `sha256sum -c` checks too. A damaged file is found on loading, before it answers anything.
+On disk it is a folder: map.json (scorer, places, settings), items.npy (where each map item is), drive.npy
+(where each image of the drive was taken), the network as weights.safetensors and network.onnx, or the
+reference images as references.npy, and SHA256SUMS over all of them, which `sha256sum -c` checks too. A
+damaged file is found on loading, before it answers anything.
 """
 
 from __future__ import annotations
@@ -48,6 +49,9 @@ class PlaceMap:
     """The places and the rule of what counts as the same place."""
     items: Items
     """What each entry of a score row stands for."""
+    drive: NDArray[np.float64]
+    """(images, 3) easting, northing and heading of each image that the map was learned from, NaN where
+    unknown: it tells whether the map has a view, not only a place."""
     settings: dict[str, Any] = field(default_factory=dict)
     """How it was made: source, sensor, windows, images, train, scorer, zone."""
     network: bytes | None = None
@@ -74,6 +78,7 @@ class PlaceMap:
                 np.save(folder / "references.npy", self.references)
             columns = [self.items.place, *self.items.position.T, self.items.heading_deg]
             np.save(folder / "items.npy", np.stack(columns, axis=1).astype(np.float64))
+            np.save(folder / "drive.npy", self.drive)
             description = {
                 "format": FORMAT,
                 "scorer": self.scorer,
@@ -97,6 +102,7 @@ class PlaceMap:
             if description.get("format") != FORMAT:
                 raise PlaceMapError(f"{what} has the format {description.get('format')}, this is {FORMAT}")
             columns = read_array(folder / "items.npy", what)
+            drive = read_array(folder / "drive.npy", what)
         except PlaceMapError:
             raise
         except InputError as error:
@@ -105,6 +111,7 @@ class PlaceMap:
             scorer=description["scorer"],
             places=places.from_dict(description["places"]),
             items=Items(columns[:, 0].astype(np.int64), columns[:, 1:3], columns[:, 3]),
+            drive=drive,
             settings=description["settings"],
             **_content(folder, what),
         )

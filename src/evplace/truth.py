@@ -151,8 +151,10 @@ def by_view(query: Track, reference: Track, radius_m: float = 20.0, angle_deg: f
     heading is not judged; a reference without either is never right.
     """
 
+    here, there = query.xy, reference.xy
+
     def block(part: slice) -> Bools:
-        near = _near(query.xy[part], reference.xy, radius_m)
+        near = _near(here[part], there, radius_m)
         turn = query.heading_deg[part, None] - reference.heading_deg
         return near & (np.abs((turn + 180) % 360 - 180) <= angle_deg)
 

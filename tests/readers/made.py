@@ -68,6 +68,69 @@ def npz(folder: Path, events: Events) -> Path:
     return path
 
 
+def hdf5(folder: Path, events: Events) -> Path:
+    """The layout of DSEC, in chunks."""
+    h5py: Any = pytest.importorskip("h5py")
+    path = folder / "made.h5"
+    with h5py.File(path, "w") as file:
+        file["t_offset"] = 0
+        file["ms_to_idx"] = np.searchsorted(events.t_us, np.arange(0, 100_000, 1000))
+        group = file.create_group("events")
+        group.attrs["width"], group.attrs["height"] = events.size
+        for name, rows in (
+            ("t", events.t_us),
+            ("x", events.x),
+            ("y", events.y),
+            ("p", events.p.astype("u1")),
+        ):
+            group.create_dataset(name, data=rows, chunks=(min(1024, len(rows)),), compression="gzip")
+    return path
+
+
+def aedat3(folder: Path, events: Events) -> Path:
+    """Packets of 100 events, and one of another kind between any two."""
+    data = b"#!AER-DAT3.1\r\n#Format: RAW\r\n#Source 1: DAVIS240C\r\n#!END-HEADER\r\n"
+    pixel = events.x.astype("<u4") << 17 | events.y.astype("<u4") << 2 | events.p.astype("<u4") << 1 | 1
+    words = np.stack([pixel, (events.t_us & 0x7FFFFFFF).astype("<u4")], 1)
+    for start in range(0, len(events), 100):
+        part, wraps = words[start : start + 100], int(events.t_us[start] >> 31)
+        data += struct.pack("<hhiiiiii", 1, 1, 8, 4, wraps, len(part), len(part), len(part)) + part.tobytes()
+        data += struct.pack("<hhiiiiii", 3, 1, 36, 4, wraps, 1, 1, 1) + bytes(36)
+    path = folder / "made3.aedat"
+    path.write_bytes(data)
+    return path
+
+
+def ros2_mcap(folder: Path, events: Events) -> Path:
+    writer: Any = pytest.importorskip("mcap.writer")
+    path = folder / "made.mcap"
+    with path.open("wb") as file:
+        out = writer.Writer(file, chunk_size=4000, compression=writer.CompressionType.ZSTD)
+        out.start("ros2", "test")
+        kind = "event_camera_msgs/msg/EventPacket"
+        channel = out.register_channel("/events", "cdr", out.register_schema(kind, "ros2msg", b""))
+        for message in packet_messages(events, aligned=True):
+            out.add_message(channel, log_time=0, publish_time=0, data=message)
+        out.finish()
+    return path
+
+
+def parquet(folder: Path, events: Events) -> Path:
+    pyarrow: Any = pytest.importorskip("pyarrow")
+    files: Any = pytest.importorskip("pyarrow.parquet")
+    columns = {"t_ns": events.t_us * 1000, "x": events.x, "y": events.y, "p": events.p.astype("u1")}
+    files.write_table(pyarrow.table(columns), folder / "made.parquet", row_group_size=500)
+    return folder / "made.parquet"
+
+
+def text(folder: Path, events: Events) -> Path:
+    """Seconds, as rpg's data sets write them."""
+    rows = zip(events.t_us.tolist(), events.x.tolist(), events.y.tolist(), events.p.tolist(), strict=True)
+    path = folder / "made.txt"
+    path.write_text("240 180\n" + "".join(f"{t / 1e6:.6f} {x} {y} {p:d}\n" for t, x, y, p in rows))
+    return path
+
+
 def evt3_words(events: Events) -> np.ndarray:
     """Events one by one, each with its row and time."""
     words = np.empty((len(events), 4), np.uint16)
@@ -153,14 +216,19 @@ def ros2_bag(folder: Path, kind: str, messages: list[bytes]) -> Path:
 
 MAKERS: dict[str, Callable[[Path, Events], Path]] = {
     "aedat2": aedat2,
+    "aedat3": aedat3,
     "aedat4": _by_faery("made.aedat4"),
     "dat": _by_faery("made.dat", version="dat2"),
     "es": _by_faery("made.es"),
     "evt2": _by_faery("made.raw", version="evt2"),
     "evt21": evt21,
     "evt3": _by_faery("made.raw", version="evt3"),
+    "hdf5": hdf5,
     "npz": npz,
+    "parquet": parquet,
     "ros1": ros1,
     "ros2_db3": ros2_db3,
+    "ros2_mcap": ros2_mcap,
+    "text": text,
 }
 """By the name of the format: writes events into a folder and returns the file."""

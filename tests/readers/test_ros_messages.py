@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from made import ros1_bag, ros2_bag, some_events
 
-from evplace.errors import RecordingError
+from evplace.errors import DamagedRecordingError, RecordingError
 from evplace.events import Events
 from evplace.readers import open_recording
 
@@ -24,6 +25,10 @@ uint16 y
 {time} ts
 bool polarity
 """
+
+
+def read(path: Path) -> Events:
+    return Events.concatenate(list(open_recording(path).packets()))
 
 
 def serialised(events: Events, frame_id: str, ros1: bool) -> list[bytes]:
@@ -92,3 +97,42 @@ def test_the_bags_of_the_second_library(tmp_path: Path) -> None:
         for message in serialised(events, "cam", ros1=False):
             writer.write(line, 0, message)
     assert sum(map(len, open_recording(tmp_path / "packed").packets())) == 100
+
+
+def packet(encoding: str, base_ns: int, payload: bytes) -> bytes:
+    """A serialised event_camera_msgs/EventPacket of ROS 1, stamped 7 s."""
+    head = struct.pack("<IIII3sIIQQ", 0, 7, 0, 3, b"cam", 180, 240, 0, base_ns)
+    name = encoding.encode()
+    return head + struct.pack("<I", len(name)) + name + b"\0" + struct.pack("<I", len(payload)) + payload
+
+
+def test_the_encoding_mono(tmp_path: Path) -> None:
+    events = some_events(500, 900_000)
+    dt_ns = events.t_us.astype("<u8") * np.uint64(1000)
+    x, y, p = (field.astype("<u8") for field in (events.x, events.y, events.p))
+    words = p << np.uint64(63) | y << np.uint64(48) | x << np.uint64(32) | dt_ns
+    messages = [packet("mono", 10**9, words[:250].tobytes()), packet("mono", 10**9, words[250:].tobytes())]
+    back = read(ros1_bag(tmp_path, "event_camera_msgs/EventPacket", messages))
+    assert np.array_equal(back.t_us - 7_000_000, events.t_us - events.t_us[0])
+    assert np.array_equal(back.x, events.x)
+    assert np.array_equal(back.y, events.y)
+    assert np.array_equal(back.p, events.p)
+
+
+def test_the_encoding_libcaer_with_a_wrap_inside_a_packet(tmp_path: Path) -> None:
+    events = some_events(500, 900_000)
+    true_us = events.t_us + (1 << 31) - 400_000
+    pixel = events.x.astype("<u4") << 17 | events.y.astype("<u4") << 2 | events.p.astype("<u4") << 1 | 1
+    words = np.stack([pixel, (true_us & 0x7FFFFFFF).astype("<u4")], 1).tobytes()
+    back = read(
+        ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [packet("libcaer", 5_000_000_000, words)])
+    )
+    assert np.array_equal(back.t_us, true_us + 5_000_000)
+    assert np.array_equal(back.x, events.x)
+    assert np.array_equal(back.p, events.p)
+
+
+def test_an_unknown_encoding_is_an_error_that_names_the_known(tmp_path: Path) -> None:
+    path = ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [packet("evt9", 0, b"\0" * 8)])
+    with pytest.raises(DamagedRecordingError, match=r"evt9.*known are evt3, mono, libcaer"):
+        read(path)

@@ -134,6 +134,31 @@ def test_bad_fixes_are_masked_before_utm(tmp_path: Path) -> None:
     assert track.dropped == {"broken row": 1, "no fix": 2, "out of range": 2, "backwards": 1}
 
 
+@pytest.mark.parametrize("encoding", ["UTF-8", "UTF-8-SIG", "UTF-16", "ISO-8859-1"])
+def test_gpx_in_any_encoding(tmp_path: Path, encoding: str) -> None:
+    point = '<trkpt lat="51" lon="-1"><time>2020-01-01T00:00:00Z</time></trkpt>'
+    text = f'<gpx version="1.1" creator="é"><trk><trkseg>{point}</trkseg></trk></gpx>'
+    declared = encoding.removesuffix("-SIG")
+    path = tmp_path / "walk.gpx"
+    path.write_bytes(f'<?xml version="1.0" encoding="{declared}"?>{text}'.encode(encoding))
+    assert open_track(path).t_us.tolist() == [1577836800000000]
+
+
+def test_odd_cells_cost_one_row_each(tmp_path: Path) -> None:
+    rows = [
+        "1,51,-1,9",
+        '2,"51,-1,9',
+        "1e30,51,-1,9",
+        "NaN,51,-1,9",
+        "3,51,-1,inf",
+        f"4,{'5' * 200_000},-1,9",
+    ]
+    path = write(tmp_path, "\n".join(["timestamp,latitude,longitude,course", *rows, "5,51,-1,9"]))
+    track = open_track(path, heading="course")
+    assert (track.t_us.tolist(), track.dropped) == ([1, 3, 5], {"broken row": 4})
+    assert np.isnan(track.heading_deg[1])
+
+
 def test_one_zone_for_the_whole_track_and_for_its_queries(tmp_path: Path) -> None:
     rows = ["1,50,5.999", "2,50,6.001"]
     path = write(tmp_path, "\n".join(["timestamp,latitude,longitude", *rows]))

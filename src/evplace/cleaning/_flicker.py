@@ -18,6 +18,9 @@ MAINS_HZ = (50, 60, 100, 120, 200, 240)
 _PHASES = 256
 """Steps of a full turn in the flicker meter's table."""
 
+_MIN_PAIRS = 1000
+"""Below this the flicker of a region is not known: chance alone gives 1 / sqrt(pairs)."""
+
 
 class FlickerMeter:
     """How much of each region's events comes and goes with a lamp, for each of `frequencies_hz`.
@@ -67,9 +70,9 @@ class FlickerMeter:
     def strengths(self) -> NDArray[np.float64]:
         """(region rows, region columns, frequencies) 0 to 1, over all complete windows.
 
-        NaN where no window is complete or holds two events of the region.
+        NaN where a region's events make under 1000 pairs.
         """
-        pairs = np.where(self._pairs > 0, self._pairs, np.nan)[:, None]
+        pairs = np.where(self._pairs >= _MIN_PAIRS, self._pairs, np.nan)[:, None]
         agreement = (self._power / pairs).reshape(len(pairs), -1, 3)
         comb = agreement[:, :, 0] - agreement[:, :, 1:].mean(axis=2)
         return np.asarray(np.clip(comb, 0, 1).reshape(*self._grid, -1), np.float64)

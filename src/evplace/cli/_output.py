@@ -9,6 +9,8 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+Show = Callable[[int, int, str], None]
+"""Moves a progress bar: (done, total, remark)."""
 USED_GOOD_PART = 3
 """Exit code where a recording is damaged and its good part was used."""
 
@@ -44,7 +46,7 @@ def note(text: str) -> None:
 
 
 @contextlib.contextmanager
-def progress(what: str) -> Iterator[Callable[[int, int, str], None]]:
+def progress(what: str) -> Iterator[Show]:
     """A bar with rate and time left, on standard error; call what it gives with (done, total, remark)."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn

@@ -25,7 +25,7 @@ from evplace.errors import OutputError, TraverseError
 from evplace.images import ImageSettings
 from evplace.places import PlaceGrid, PlaceRuns, Places
 from evplace.scorers import checked_settings
-from evplace.train import PRESETS, TrainSettings, train
+from evplace.training import PRESETS, TrainSettings, train
 from evplace.traverse import Traverse
 from evplace.windows import WindowSettings
 

@@ -41,14 +41,14 @@ __all__ = [
     "Result",
     "average_precision",
     "compare",
-    "evaluate",
     "gallery_spacing",
     "hits_at",
+    "measure",
     "precision_recall",
 ]
 
 
-def evaluate(
+def measure(
     answers: Answers,
     truth: Truth,
     scores: NDArray[np.floating[Any]] | None = None,

@@ -109,7 +109,8 @@ def _search(
     memory, items = scores.shape
     query = state[QUERIES]
     while state[NODES] + 2 * K + 1 <= nodes.shape[0]:
-        n = _pop(heap, state)
+        # Equal costs can empty the heap, where the originals stop with an error: go on from the best.
+        n = _pop(heap, state) if state[ENTRIES] > 0 else state[BEST]
         node = nodes[n]
         if node.query + 1 <= query - memory or not _worth(n, nodes, state[BEST], alpha):
             continue
@@ -248,7 +249,7 @@ def _push(acc: float, node: int, heap: NDArray[Any], state: NDArray[np.int64]) -
 
 @njit(cache=True)
 def _pop(heap: NDArray[Any], state: NDArray[np.int64]) -> int:
-    """Remove the cheapest entry; its node. The best node is always there until it is expanded."""
+    """Remove the cheapest entry; its node."""
     first: int = heap[0].node
     state[ENTRIES] -= 1
     size = state[ENTRIES]

@@ -19,12 +19,13 @@ LONGEST_STEP = int(np.iinfo(np.int16).max)
 class Viterbi:
     """Maximises the sum of gains along a path; remembers one step, 2 bytes, for each query and item.
 
-    From one query to the next the item grows by `low` to `high`, which adds `stay`, or jumps anywhere, which
-    adds `jump` (-inf: never). Among equal parents the lowest item wins, and the step over the jump.
+    From one query to the next the item grows by `low`, low + 1, ..., which adds `gains` (one each), or jumps
+    anywhere, which adds `jump` (-inf: never). Among equal parents the lowest item wins, and a step over the
+    jump.
     """
 
-    def __init__(self, low: int, high: int, stay: float = 0.0, jump: float = -np.inf) -> None:
-        self._rule = (low, high, stay, jump)
+    def __init__(self, low: int, gains: NDArray[np.float64], jump: float = -np.inf) -> None:
+        self._rule = (low, gains, jump)
         self._sums: NDArray[np.float64] = np.empty(0)
         self._steps: list[NDArray[np.int16]] = []
         self._tops: list[NDArray[np.int64]] = []
@@ -64,8 +65,7 @@ def _forward(
     steps: NDArray[np.int16],
     tops: NDArray[np.int64],
     low: int,
-    high: int,
-    stay: float,
+    moves: NDArray[np.float64],
     jump: float,
 ) -> NDArray[np.int64]:
     """Fill `steps`, and `tops` with the best item before each query; `sums` (items,) is NaN at first."""
@@ -81,22 +81,26 @@ def _forward(
         else:
             before[:] = sums
             tops[i] = np.argmax(before)
-            _best_parents(before, sums, chosen, low, high)
+            _best_parents(before, sums, chosen, low, moves)
             leap = before[tops[i]] + jump
             for r in range(items):
-                stepped = sums[r] + stay
-                steps[i, r] = JUMP if leap > stepped else chosen[r]
-                sums[r] = max(leap, stepped) + gains[i, r]
+                steps[i, r] = JUMP if leap > sums[r] else chosen[r]
+                sums[r] = max(leap, sums[r]) + gains[i, r]
         ends[i] = np.argmax(sums)
     return ends
 
 
 @njit(cache=True)
 def _best_parents(
-    before: NDArray[np.float64], best: NDArray[np.float64], chosen: NDArray[np.int16], low: int, high: int
+    before: NDArray[np.float64],
+    best: NDArray[np.float64],
+    chosen: NDArray[np.int16],
+    low: int,
+    moves: NDArray[np.float64],
 ) -> None:
-    """For each item the largest sum of the items `low` to `high` steps before it, and that step."""
+    """For each item the largest sum of the items `low`, low + 1, ... steps before it, and that step."""
     items = before.shape[0]
+    high = low + moves.shape[0] - 1
     best[:] = -np.inf
     for r in range(items):
         chosen[r] = min(high, r)
@@ -110,13 +114,19 @@ def _best_parents(
             before[parent : items - child],
             chosen[child : items - parent],
             np.int16(step),
+            moves[step - low],
         )
 
 
 @njit(cache=True)
 def _raise(
-    best: NDArray[np.float64], other: NDArray[np.float64], chosen: NDArray[np.int16], step: np.int16
+    best: NDArray[np.float64],
+    other: NDArray[np.float64],
+    chosen: NDArray[np.int16],
+    step: np.int16,
+    move: float,
 ) -> None:
     for r in range(best.shape[0]):
-        chosen[r] = step if other[r] > best[r] else chosen[r]
-        best[r] = max(best[r], other[r])
+        value = other[r] + move
+        chosen[r] = step if value > best[r] else chosen[r]
+        best[r] = max(best[r], value)

@@ -57,7 +57,8 @@ class FullSearch:
     def __init__(self, settings: Settings, distances: bool = False) -> None:
         self._check, self._distances = RowCheck(), distances
         self._m = np.inf if settings.m is None and distances else 3.7 if settings.m is None else settings.m
-        self._search = Viterbi(-settings.K, settings.K - (settings.window == "half_open"))
+        steps = 2 * settings.K + (settings.window == "inclusive")
+        self._search = Viterbi(-settings.K, np.zeros(steps))
         self._rows: list[NDArray[np.floating[Any]]] = []
 
     def step(self, row: Row) -> Answer:

@@ -2,7 +2,7 @@
 
 "Visual place recognition using HMM sequence matching" (IROS 2014) says: similarity probabilities of locally
 contrasted images, transitions that limit the velocity, a path that may be discontinuous, and a matrix of
-reduced rank for scoring. All numbers, the uniform transitions, the softmax and the score are ours.
+reduced rank for scoring. All numbers, the form of the transitions, the softmax and the score are ours.
 """
 
 from __future__ import annotations
@@ -28,6 +28,11 @@ class Settings:
     """Fewest references that one query moves on; 0 lets the query stand, less than 0 lets it turn back."""
     v_max: int = 3
     """Most references that one query moves on."""
+    speed: float = 1.0
+    """References that a query moves on by where nothing is unusual: the drives' speeds and frame rates."""
+    steady: float = 0.9
+    """Probability that a query moves on at `speed`, or by the whole numbers next to it; the rest is spread
+    evenly from v_min to v_max. 0 where the speed is quite unknown."""
     jump: float = 1e-3
     """Probability of a jump to any reference at all, at each query."""
     emission: Literal["contrast", "softmax", "probabilities"] = "contrast"
@@ -38,7 +43,8 @@ class Settings:
     R: int = 10
     """References in the neighbourhood of the local contrast; even."""
     drop: int = 0
-    """Leading singular components of the log-probability matrix that `path` removes before scoring."""
+    """Leading singular components of the log-probability matrix that `path` removes first: what all queries
+    have in common, such as references that look like everything. 0 leaves `path` the causal model's."""
     length: int = 15
     """Queries over which the score of a match is averaged, centred on it; shorter at the ends."""
     threshold: float = 0.0
@@ -50,6 +56,10 @@ class Settings:
             raise SettingsError(f"v_min = {self.v_min} and v_max = {self.v_max}: take v_min <= v_max")
         if not 0 < self.jump < 1:
             raise SettingsError(f"jump = {self.jump} is no probability between 0 and 1")
+        if not 0 <= self.steady <= 1:
+            raise SettingsError(f"steady = {self.steady} is no probability from 0 to 1")
+        if not self.v_min <= self.speed <= self.v_max:
+            raise SettingsError(f"speed = {self.speed} does not lie between v_min and v_max")
         if self.temperature <= 0 or self.length < 1 or self.drop < 0:
             raise SettingsError("take a temperature above 0, a length from 1, and drop from 0")
         if self.R < 2 or self.R % 2:
@@ -67,8 +77,8 @@ def matcher(settings: Settings, distances: bool = False) -> Matcher:  # noqa: AR
 class Model:
     """Remembers the log-probabilities and a step for each cell, 6 bytes.
 
-    The score is the log of how much likelier the matched references are than chance, in `path`
-    averaged over `length` queries and on the reduced matrix, in `step` of its own query alone.
+    `step` answers by the rows so far, `path` by all of them, on the matrix of reduced rank. The score is the
+    log of how much likelier the matched references are than chance, in `path` averaged over `length` queries.
     """
 
     def __init__(self, settings: Settings) -> None:
@@ -91,21 +101,32 @@ class Model:
         """The likeliest path through all queries so far."""
         if self._search is None:
             return Path.of([])
-        item = self._search.trace()
-        logs = without_leading(np.concatenate(self._rows), self._settings.drop)
+        logs, search = np.concatenate(self._rows), self._search
+        if self._settings.drop:
+            logs = without_leading(logs, self._settings.drop)
+            search = transitions(self._settings, logs.shape[1])
+            for piece in pieces(logs):
+                search.extend(piece.astype(np.float64))
+        item = search.trace()
         score = moving_mean(logs[np.arange(len(item)), item].astype(np.float64), self._settings.length)
         return Path(item, score, score > self._settings.threshold)
 
     def _advance(self, rows: Rows) -> NDArray[np.int64]:
         table = self._check(rows)
-        s = self._settings
         if self._search is None:
-            anywhere = s.jump / table.shape[1]
-            near = (1 - s.jump) / (s.v_max - s.v_min + 1) + anywhere
-            self._search = Viterbi(s.v_min, s.v_max, float(np.log(near)), float(np.log(anywhere)))
-        logs = log_odds(table, s)
+            self._search = transitions(self._settings, table.shape[1])
+        logs = log_odds(table, self._settings)
         self._rows.append(logs)
         return self._search.extend(logs.astype(np.float64))
+
+
+def transitions(settings: Settings, items: int) -> Viterbi:
+    """A search from anywhere, that moves on as the settings say."""
+    s = settings
+    steps = np.arange(s.v_min, s.v_max + 1)
+    usual = s.steady * np.maximum(0, 1 - np.abs(steps - s.speed))
+    probability = (1 - s.jump) * (usual + (1 - s.steady) / len(steps)) + s.jump / items
+    return Viterbi(s.v_min, np.log(probability), float(np.log(s.jump / items)))
 
 
 def log_odds(rows: NDArray[np.floating[Any]], settings: Settings) -> NDArray[np.float32]:

@@ -47,7 +47,11 @@ def open_recording(
         raise RecordingError(f"unknown time unit '{time_unit}': known are {', '.join(TIME_UNITS)}")
     head = _head(file)
     name = _found(file, head) if format is None else format
-    source: Source = plugs.load("readers", name).read(file, Hints(size, time_unit))
+    reader = plugs.load("readers", name)
+    try:
+        source: Source = reader.read(file, Hints(size, time_unit))
+    except OSError as error:
+        raise RecordingError(f"cannot read {file} as {name}: {error.strerror or error}") from error
     return Recording(file, name, source, size)
 
 

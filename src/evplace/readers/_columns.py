@@ -12,12 +12,12 @@ from evplace.readers._source import Block, Hints
 
 US_PER_UNIT = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
 NAMES = {
-    "t": ("t", "ts", "time", "times", "timestamp", "timestamps", "t_s", "t_ms", "t_us", "t_ns"),
-    "x": ("x", "xs"),
-    "y": ("y", "ys"),
+    "t": ("t_us", "t_ns", "t_ms", "t_s", "t", "ts", "time", "times", "timestamp", "timestamps"),
+    "x": ("x", "xs", "x_coordinates"),
+    "y": ("y", "ys", "y_coordinates"),
     "p": ("p", "ps", "pol", "polarity", "polarities", "on"),
 }
-"""Field -> the names under which files hold it."""
+"""Field -> the names under which files hold it, the clearest first."""
 NOWHERE = 0xFFFF
 """A coordinate beyond any sensor: stands for numbers that a pixel cannot have."""
 
@@ -68,8 +68,9 @@ def _microseconds(t: NDArray[Any], unit: str) -> NDArray[np.int64]:
             return np.rint(np.clip(t.astype(np.float64) * US_PER_UNIT[unit], -limit, limit)).astype(np.int64)
     if unit == "ns":
         return t.astype(np.int64) // 1000
+    factor = int(US_PER_UNIT[unit])
     whole = t.astype(np.int64)
-    return whole if unit == "us" else whole * int(US_PER_UNIT[unit])
+    return whole if factor == 1 else np.clip(whole, -(2**62) // factor, 2**62 // factor) * factor
 
 
 def _pixels(values: NDArray[Any]) -> NDArray[np.uint16]:

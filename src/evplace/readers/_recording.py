@@ -65,6 +65,8 @@ class Recording:
                 yield from self._delivered(good)
         except DamagedRecordingError as error:
             fault = error
+        except OSError as error:
+            fault = DamagedRecordingError(f"{self.path} cannot be read further: {error.strerror or error}")
         if held is not None:
             good, _ = self._kept(held, final=True)
             yield from self._delivered(good)

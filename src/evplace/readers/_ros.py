@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.errors import DamagedRecordingError, RecordingError
+from evplace.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Encoding
 from evplace.readers._source import Block, Source, gathered, joined
-from evplace.readers.evt3 import Decoder
 
 PACKETS = ("event_camera_msgs/EventPacket", "event_array_msgs/EventArray")
 ARRAYS = ("dvs_msgs/EventArray", "prophesee_event_msgs/EventArray")
@@ -99,7 +99,7 @@ def _opened(path: Path, messages: Callable[[], Iterator[Message]], first: Messag
     size = (width, height) if 0 < width <= 1 << 16 and 0 < height <= 1 << 16 else None
     notes = []
     if first.kind in PACKETS:
-        notes.append("times: the camera's clock, moved so that the first event has the stamp of its message")
+        notes.append("times of a camera's own clock are moved: the first event has the stamp of its message")
 
     def blocks() -> Iterator[Block]:
         decode = _Packets(aligned) if first.kind in PACKETS else _Arrays(aligned)
@@ -124,23 +124,28 @@ class _Packets:
 
     def __init__(self, aligned: bool) -> None:
         self._aligned = aligned
-        self._decoder = Decoder()
+        self._encodings: dict[str, Encoding] = {}
         self._shift_us: int | None = None
 
     def __call__(self, data: bytes) -> Block:
         fields = Fields(data, self._aligned)
         stamp_ns = fields.header()
-        for kind in "IIQQ":  # height, width, seq, time_base
+        for kind in "IIQ":  # height, width, seq
             fields.take(kind)
-        encoding = fields.raw().rstrip(b"\0").decode("ascii", "replace")
+        base_ns = fields.take("Q")
+        name = fields.raw().rstrip(b"\0").decode("ascii", "replace")
         fields.take("B")
-        if encoding != "evt3":
-            raise ValueError(f"its encoding '{encoding}' is none that can be read: evt3")
-        payload = fields.raw()
-        t_us, x, y, p, untimed = self._decoder.decode(np.frombuffer(payload, "<u2", len(payload) // 2))
-        if self._shift_us is None and len(t_us):
-            self._shift_us = stamp_ns // 1000 - int(t_us[0])
-        return Block(t_us + (self._shift_us or 0), x, y, p, untimed)
+        block = self._encoding(name)(fields.raw(), base_ns)
+        if self._shift_us is None and len(block.t_us):
+            self._shift_us = 0 if name in SINCE_EPOCH else stamp_ns // 1000 - int(block.t_us[0])
+        return block._replace(t_us=block.t_us + (self._shift_us or 0))
+
+    def _encoding(self, name: str) -> Encoding:
+        if name not in ENCODINGS:
+            raise ValueError(f"its encoding '{name}' cannot be read: known are {', '.join(ENCODINGS)}")
+        if name not in self._encodings:
+            self._encodings[name] = ENCODINGS[name]()
+        return self._encodings[name]
 
 
 class _Arrays:

@@ -45,8 +45,11 @@ def _lz4(data: bytes, limit: int) -> bytes:
 
 
 def _zstd(data: bytes, limit: int) -> bytes:
-    with zstandard.ZstdDecompressor(max_window_size=limit).stream_reader(io.BytesIO(data)) as reader:
-        return reader.read(limit + 1)
+    with zstandard.ZstdDecompressor(max_window_size=LIMIT).stream_reader(io.BytesIO(data)) as reader:
+        whole = reader.read(limit + 1)
+    if len(whole) < zstandard.frame_content_size(data) <= limit:
+        raise EOFError("it ends too early")
+    return whole
 
 
 def _bz2(data: bytes, limit: int) -> bytes:

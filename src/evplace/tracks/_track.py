@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -103,6 +103,23 @@ class Track:
         heading = _heading(times, easting, northing, given)
         return cls(times, nowhere, nowhere.copy(), easting, northing, heading, 0, True)
 
+    def in_zone(self, zone: int, northern: bool) -> Track:
+        """The same fixes in metres of another UTM zone: a query's, in its map's zone.
+
+        Raises TrackError where only one of the two is a local plane (zone 0), or the zone is far away.
+        """
+        import utm
+
+        if not (zone and self.zone):
+            raise TrackError("positions in a local plane and positions on the Earth cannot be compared")
+        known = self.known
+        _check_zone(zone, self.longitude[known])
+        easting, northing = np.full(len(self), np.nan), np.full(len(self), np.nan)
+        easting[known], northing[known], _, _ = utm.from_latlon(
+            self.latitude[known], self.longitude[known], force_zone_number=zone, force_northern=northern
+        )
+        return replace(self, easting=easting, northing=northing, zone=zone, northern=northern)
+
     def at(self, t_us: ArrayLike, max_gap_s: float = 1.0, max_gap_m: float = 20.0) -> Track:
         """The track at the times `t_us` (M,), in any order, linear in UTM between two fixes.
 
@@ -164,4 +181,4 @@ def _heading(t_us: NDArray[np.int64], easting: Floats, northing: Floats, given: 
     span_us = t_us[after] - t_us[before]
     moving = np.hypot(east, north) * 1e6 >= _MIN_SPEED_MPS * np.maximum(span_us, 1)
     moved = np.where(moving & (span_us <= _MAX_STEP_US), np.rad2deg(np.arctan2(east, north)), np.nan)
-    return np.where(np.isnan(given), moved, given) % 360
+    return np.where(np.isfinite(given), given, moved) % 360

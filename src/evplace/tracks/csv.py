@@ -6,7 +6,7 @@ import csv
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
@@ -17,6 +17,7 @@ from evplace.tracks._fixes import Fix, Fixes, unroll_days
 
 _CLOCK = re.compile(r"\d{1,8}")
 _ZONE = re.compile(r"(\d{1,2})\s*([C-HJ-NP-X]?)", re.IGNORECASE)
+_MAX_US = 2**62
 _UNIT_US = {"s": Decimal(1_000_000), "ms": Decimal(1000), "us": Decimal(1), "ns": Decimal("0.001")}
 
 
@@ -74,38 +75,36 @@ def read(path: Path, settings: Settings) -> Fixes:
 
     Raises TrackError where a column is missing.
     """
-    rows = _rows(path)
-    header = next(rows, [])
+    first, *lines = _lines(path)
+    delimiter = max(",;\t ", key=first.count)
+    header = [name.strip() for name in _cells(first.lstrip("#% "), delimiter)]
     position = _position_reader(header, settings)
     dropped: Counter[str] = Counter()
     fixes = []
-    for cells in rows:
-        row = dict(zip(header, cells, strict=False))
+    for line in lines:
         try:
+            row = dict(zip(header, _cells(line, delimiter), strict=False))
             fixes.append(Fix(_time_us(row, settings), *position(row), _heading(row, settings)))
-        except (ValueError, KeyError, InvalidOperation, OverflowError):
+        except (ValueError, KeyError, InvalidOperation, OverflowError, csv.Error):
             dropped["broken row"] += 1
     found = Fixes.of(fixes, dict(dropped))
     t_us = unroll_days(found.t_us) if settings.time_unit == "clock" else found.t_us
     return Fixes(t_us, found.latitude, found.longitude, found.heading_deg, found.dropped)
 
 
-def _rows(path: Path) -> Iterator[list[str]]:
-    """The table's rows as text, whatever ends its lines; the header first."""
-    lines = [
-        line
-        for line in re.split(r"\r\n|\r|\n", path.read_bytes().decode("utf-8-sig", "replace"))
-        if line.strip()
-    ]
-    first = lines[0] if lines else ""
-    delimiter = max(",;\t ", key=first.count)
-    lines[:1] = [first.lstrip("#% ")]
-    return csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+def _lines(path: Path) -> list[str]:
+    """The lines that are not empty (at least one, as the format was recognised), whatever ends them."""
+    text = path.read_bytes().decode("utf-8-sig", "replace")
+    return [line for line in re.split(r"\r\n|\r|\n", text) if line.strip()]
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    """One line's cells. Read alone, so that a quote that is not closed costs one row, not the rest."""
+    return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
 
 
 def _position_reader(header: list[str], settings: Settings) -> Callable[[Row], tuple[float, float]]:
     """What turns a row into latitude and longitude in degrees."""
-    header[:] = [name.strip() for name in header]
     geographic = (settings.latitude, settings.longitude)
     metric = (settings.easting, settings.northing, settings.utm_zone)
     wanted = [settings.time] + ([settings.heading] if settings.heading else [])
@@ -139,7 +138,10 @@ def _time_us(row: Row, settings: Settings) -> int:
     text = row[settings.time].strip()
     if settings.time_unit == "clock":
         return _clock_us(text)
-    return int((Decimal(text) * _UNIT_US[settings.time_unit]).to_integral_value())
+    t_us = int((Decimal(text) * _UNIT_US[settings.time_unit]).to_integral_value())
+    if abs(t_us) > _MAX_US:
+        raise ValueError(text)
+    return t_us
 
 
 def _clock_us(text: str) -> int:

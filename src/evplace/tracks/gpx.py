@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import datetime
 import re
 from collections import Counter
@@ -16,6 +17,7 @@ from evplace.errors import TrackError
 from evplace.tracks._fixes import Fix, Fixes
 
 _EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
+_ENCODING = re.compile(r"""\sencoding=["']([\w.:-]+)["']""")
 _MICROSECOND = datetime.timedelta(microseconds=1)
 
 
@@ -57,9 +59,18 @@ def _parsed(path: Path) -> Any:
     import gpxpy
 
     try:
-        return gpxpy.parse(path.read_bytes())
+        return gpxpy.parse(_text(path.read_bytes()))
     except (gpxpy.gpx.GPXException, ValueError, LookupError, TypeError, AttributeError) as error:
         raise TrackError(f"not a sound GPX file: {' '.join(str(error).split())}") from error
+
+
+def _text(xml: bytes) -> str:
+    """The file as text, by its byte order mark, else by the encoding that it declares, else as UTF-8."""
+    if xml.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return _ENCODING.sub("", xml.decode("utf-16"), count=1)
+    declared = _ENCODING.search(xml[:200].decode("ascii", "replace"))
+    plain = xml.removeprefix(codecs.BOM_UTF8).decode(declared[1] if declared else "utf-8")
+    return _ENCODING.sub("", plain, count=1)
 
 
 def _points(gpx: Any) -> Iterator[Any]:

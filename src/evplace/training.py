@@ -97,15 +97,17 @@ def train(
         "zone": [day.track.zone, day.track.northern] if day.track is not None else None,
         "scorer": scorer_settings or {},
     }
+    heading = day.track.heading_deg if day.track is not None else np.full(len(day), np.nan)
+    drive = np.column_stack([day.xy, heading])[used]
     if scorer != "network":
-        items = _image_items(day, labels, used)
-        return PlaceMap(scorer, places, items, description, references=np.asarray(day.images[used]))
+        items = Items(labels[used], drive[:, :2], drive[:, 2])
+        return PlaceMap(scorer, places, items, drive, description, references=np.asarray(day.images[used]))
     from evplace.network_onnx import onnx_bytes
 
     weights = train_network(day.images, labels, used, places.n, settings, progress, checkpoint)
     description["train"] = settings_room.to_dict(settings)
     network = onnx_bytes(weights, image_shape(day.images), settings.last_relu)
-    return PlaceMap("network", places, _place_items(places), description, network, weights)
+    return PlaceMap("network", places, _place_items(places), drive, description, network, weights)
 
 
 def train_network(
@@ -187,9 +189,3 @@ def _bfloat16(settings: TrainSettings, device: str) -> bool:
 def _place_items(places: Places) -> Items:
     centres = places.centres()
     return Items(np.arange(places.n), centres, np.full(places.n, np.nan))
-
-
-def _image_items(day: Traverse, labels: NDArray[np.int64], used: NDArray[np.bool_]) -> Items:
-    n = int(used.sum())
-    heading = day.track.heading_deg[used] if day.track is not None else np.full(n, np.nan)
-    return Items(labels[used], day.xy[used], heading)

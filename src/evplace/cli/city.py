@@ -1,0 +1,52 @@
+"""Drive through the virtual city: traverses by day, night, rain, dusk, fog, snow and low sun.
+
+Examples:
+  evplace city -o city                                     the benchmark: two paths by day, night and rain
+  evplace city -o small --route-length-m 300 --fps 60      minutes, not a quarter of an hour
+  evplace city -o winter --conditions day snow --paths 1 --keep-events
+
+Each drive is a folder: a traverse for each sensor (ideal, weak, from-8bit) and for the colour camera, with
+the same times and the same truth. A call that was stopped goes on where it was when it is given again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from evplace.city import CitySettings, generate
+from evplace.cli._output import print_json, progress
+
+
+@dataclass(frozen=True)
+class Args:
+    """Flags of `evplace city`."""
+
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+    """The folder for the drives; drives that are there already are kept."""
+    city: Annotated[CitySettings, tyro.conf.arg(name="")] = field(default_factory=CitySettings)
+    settings: Path | None = None
+    """A TOML file with any of these settings, in a table city."""
+    workers: int | None = None
+    """Processes; one a core if not given. They do not change the result."""
+    json: bool = False
+    """Print one JSON object."""
+
+
+def run(args: Args) -> int:
+    """Make the drives that are not there yet."""
+    with progress("driving") as show:
+        drives = generate(
+            args.out,
+            args.city,
+            args.workers,
+            lambda at: show(round(at.share * 1000), 1000, f"{at.drive}, {at.left_s:.0f} s left"),
+        )
+    if args.json:
+        print_json({"drives": [str(drive) for drive in drives]})
+    else:
+        print("\n".join(map(str, drives)))
+    return 0

@@ -1,0 +1,103 @@
+"""Measure how well a map finds a drive: figures, precision-recall curve, a result folder.
+
+Examples:
+  evplace evaluate campus.evp night.aedat4 --track night.nmea -o night.result
+  evplace evaluate campus.evp night -o night.result --matcher seqslam
+  evplace evaluate campus.evp night -o night.result --rule view       opposite directions are other views
+  evplace evaluate street.evp query/ -o q.result --truth truth.npy    a matrix, rows = queries
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from evplace import settings
+from evplace.capture import open_traverse
+from evplace.cli._output import note, print_facts, print_json
+from evplace.errors import OutputError
+from evplace.images import ImageSettings
+from evplace.localizer import Localizer
+from evplace.placemap import PlaceMap
+from evplace.traverse import Traverse
+from evplace.trial import evaluate
+from evplace.truth import Truth, by_frames, by_matrix
+from evplace.windows import WindowSettings
+
+SHOWN = (
+    "queries", "left_out", "accuracy", "accuracy_seen", "rejection_rate", "precision", "recall",
+    "recall_accepted", "average_precision", "recall_at_full_precision", "recall@1", "recall@5", "recall@10",
+    "recall@20", "chance", "gallery_spacing_m",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Args:
+    """Flags of `evplace evaluate`."""
+
+    map: tyro.conf.Positional[Path]
+    """A map that `evplace train` wrote."""
+    drive: tyro.conf.Positional[Path]
+    """The query drive: an event recording, a folder of images, or a traverse folder."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+    """The result folder to write."""
+    track: Path | None = None
+    """GPS log of the query drive: NMEA, GPX or csv."""
+    truth: Path | None = None
+    """A .npy matrix of 0 and 1, rows = queries, columns = map items, in place of positions."""
+    frames: int | None = None
+    """Query and map are in step: how many items off an answer may be, in place of positions."""
+    rule: Literal["places", "view"] = "places"
+    """places: the paper's eight neighbours. view: also a reference within 20 m and 34 degrees."""
+    matcher: str = "local"
+    """best (global-max), local (Algorithm 1), seqslam, graph, dp or hmm."""
+    preset: str | None = None
+    """A preset of the matcher, for example paper."""
+    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """A setting of the matcher, as name=value."""
+    scores: bool = False
+    """Keep the score rows in the result."""
+    size: tuple[int, int] | None = None
+    """Width and height of the sensor in pixels, where the file does not say."""
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None
+    """Unit of the times, where the file does not say."""
+    overwrite: bool = False
+    """Replace what exists."""
+    json: bool = False
+    """Print one JSON object: all figures."""
+
+
+def run(args: Args) -> int:
+    """Localise the drive, measure, save and print."""
+    if args.out.exists() and not args.overwrite:
+        raise OutputError(f"{args.out} exists: choose another name, remove it, or add --overwrite")
+    place_map = PlaceMap.load(args.map)
+    where = Localizer(place_map, args.matcher, args.preset, **settings.from_pairs(args.set))
+    query = _opened(args, place_map)
+    result = evaluate(where, query, _truth(args, place_map, query), args.rule)
+    result.save(args.out, args.overwrite, args.scores)
+    if args.json:
+        print_json(result.figures)
+    else:
+        print_facts(str(args.out), {name: result.figures[name] for name in SHOWN if name in result.figures})
+    if query.info.get("fault"):
+        note(f"{query.info['fault']}; what came before it was measured")
+    return 0
+
+
+def _opened(args: Args, place_map: PlaceMap) -> Traverse:
+    """The query, its images made as the map's were."""
+    windows = settings.make(WindowSettings, place_map.settings.get("windows") or {})
+    images = settings.make(ImageSettings, place_map.settings.get("images") or {})
+    return open_traverse(args.drive, args.track, windows, images, args.size, args.time_unit)
+
+
+def _truth(args: Args, place_map: PlaceMap, query: Traverse) -> Truth | None:
+    if args.truth is not None:
+        return by_matrix(args.truth, len(query), len(place_map.items))
+    if args.frames is not None:
+        return by_frames(len(query), len(place_map.items), args.frames)
+    return None

@@ -1,0 +1,30 @@
+"""The public face, pinned."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import evplace
+
+PUBLIC = [
+    "Events", "EvplaceError", "ImageSettings", "Localizer", "Match", "PlaceGrid", "PlaceMap", "PlaceRuns",
+    "Recording", "Result", "Track", "TrainSettings", "Traverse", "WindowSettings", "__version__", "compare",
+    "evaluate", "event_image", "open_recording", "open_track", "open_traverse", "train",
+]  # fmt: skip
+
+
+def test_the_public_names_are_these() -> None:
+    assert sorted(evplace.__all__) == sorted(PUBLIC)
+    assert dir(evplace) == evplace.__all__
+
+
+def test_each_is_what_its_name_says_whatever_was_imported_before() -> None:
+    code = (
+        "import evplace, importlib, pkgutil\n"
+        "for module in pkgutil.iter_modules(evplace.__path__):\n"
+        "    if module.name != '__main__': importlib.import_module(f'evplace.{module.name}')\n"
+        "print([n for n in evplace.__all__ if type(getattr(evplace, n)).__name__ == 'module'])"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == "[]"
