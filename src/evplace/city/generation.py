@@ -79,6 +79,8 @@ def _claim(folder: Path, settings: CitySettings) -> None:
     """Leave the settings in a new folder; refuse one that was made with others."""
     wanted = {"version": VERSION, **settings.of_drive()}
     file = folder / SETTINGS_FILE
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"{folder} is a file: choose another name for the folder of drives")
     if file.exists():
         found = read_json(file, "the settings of a city")
         other = [key for key in sorted(wanted | found) if wanted.get(key) != found.get(key)]

@@ -111,7 +111,7 @@ class Simulator:
         self._room = _Room(size[0] * size[1])
 
     def push(self, frame: Frame, t_us: int) -> Events:
-        """The events between the last frame and this one, in the order of time; none for the first.
+        """The events after the last frame, up to this one, in the order of time; none for the first.
 
         `frame` is (H, W), uint8 or linear light. Raises InputError where its size or kind differs from the
         first's, or its time is not later.
@@ -174,7 +174,7 @@ class Simulator:
             return 0
         self._room.put(
             count,
-            self._rng.integers(0, t_us - self._t_us, total),
+            self._rng.integers(1, t_us - self._t_us + 1, total),
             where % self.size[0],
             where // self.size[0],
             self._rng.integers(0, 2, total).astype(bool),
@@ -410,7 +410,7 @@ def _crossings(
             pace = span / (float(end) - start) if end != old[y, x] else 0.0
             after = base + step
             while (after <= end) if up else (after >= end):
-                late = int(min(max((float(after) - start) * pace, 0.0), span))
+                late = int(min(max((float(after) - start) * pace, 1.0), span))
                 base = after
                 after = base + step
                 if start_us + late - fired_us[y, x] >= refractory_us:
