@@ -5,10 +5,10 @@
 The example is 100 event frames of 80x80 for the map and 100 of the same route as queries; the given truth is
 the same index, a frame or two off what the images show. Brisbane is sunset2 (641 frames) as the map and
 sunset1 (724) as queries, reduced to 7x7 pixels by its makers, with their truth matrix. Every matcher runs
-with its defaults or the settings named, and is asked for its best item whether it stands by it or not; a query
-without any item counts as wrong. The defaults of hmm were chosen by its author with Brisbane, Nordland and
-VPR-Bench's corridor in view, not with the example. Algorithm 1 needs probabilities: image scores are turned
-into them by a softmax of each row's standard scores.
+with its defaults or the settings named, and is asked for its best item whether it stands by it or not; a
+query without any item counts as wrong. The defaults of hmm were chosen by its author with Brisbane, Nordland
+and VPR-Bench's corridor in view, not with the example. Algorithm 1 needs probabilities: image scores are
+turned into them by a softmax of each row's standard scores.
 """
 
 from __future__ import annotations

@@ -3,7 +3,30 @@
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # for editors and type checkers; a test holds this list against the one below
+    from evplace.capture import open_traverse as open_traverse
+    from evplace.errors import EvplaceError as EvplaceError
+    from evplace.evaluation import Result as Result
+    from evplace.evaluation import compare as compare
+    from evplace.events import Events as Events
+    from evplace.images import ImageSettings as ImageSettings
+    from evplace.images import event_image as event_image
+    from evplace.localizer import Localizer as Localizer
+    from evplace.localizer import Match as Match
+    from evplace.placemap import PlaceMap as PlaceMap
+    from evplace.places import PlaceGrid as PlaceGrid
+    from evplace.places import PlaceRuns as PlaceRuns
+    from evplace.readers import Recording as Recording
+    from evplace.readers import open_recording as open_recording
+    from evplace.tracks import Track as Track
+    from evplace.tracks import open_track as open_track
+    from evplace.training import TrainSettings as TrainSettings
+    from evplace.training import train as train
+    from evplace.traverse import Traverse as Traverse
+    from evplace.trial import evaluate as evaluate
+    from evplace.windows import WindowSettings as WindowSettings
 
 __version__ = "0.1.0"
 

@@ -145,3 +145,11 @@ def test_equal_distances_give_the_lowest_reference_and_are_not_accepted(preset) 
 def test_settings_that_the_original_rejects(values, text) -> None:
     with pytest.raises(SettingsError, match=text):
         open_matcher("seqslam", **values)
+
+
+def test_contrasts_at_the_edge_of_single_precision_stay_finite() -> None:
+    rows = (np.random.default_rng(0).random((20, 40)) * 1e-20).astype(np.float32)
+    out, work = np.empty(40, np.float32), np.empty((2, 40), np.float32)
+    for row in rows:
+        enhance(row, 5, out, work)
+        assert np.isfinite(out).all()

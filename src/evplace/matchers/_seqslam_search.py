@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 TRAJECTORY, HYBRID, CONE = range(3)
 """Ways to search."""
 
+FLAT = np.float32(1e-35)
+"""Sums of squares up to this are rounding: dividing by them leaves single precision."""
+
 Offsets = NDArray[np.int64]
 """(trajectories, d_s) reference offsets of each trajectory at each of its queries."""
 
@@ -109,7 +112,7 @@ def enhance(row: NDArray[Any], half: int, out: NDArray[np.float32], work: NDArra
         count = np.float32(min(items - 1, i + half) - max(0, i - half) + 1)
         mean = total[i] / count
         spread = squares[i] - total[i] * mean
-        out[i] = -mean * np.sqrt((count - np.float32(1)) / spread) if spread > 0 else np.float32(0)
+        out[i] = -mean * np.sqrt((count - np.float32(1)) / spread) if spread > FLAT else np.float32(0)
 
 
 @njit(cache=True)

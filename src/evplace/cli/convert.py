@@ -1,0 +1,58 @@
+"""Write an event recording in another format, chosen by the new file's suffix.
+
+Examples:
+  evplace convert night.bag night.npz
+  evplace convert night.raw night.aedat4 --size 640 480
+  evplace convert night.aedat4 night.h5            in the layout of DSEC
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
+from evplace.errors import DamagedRecordingError
+from evplace.readers import open_recording
+from evplace.writers import write_recording
+
+
+@dataclass(frozen=True)
+class Args:
+    """Flags of `evplace convert`."""
+
+    source: tyro.conf.Positional[Path]
+    """An event recording of any known format."""
+    target: tyro.conf.Positional[Path]
+    """The file to write: .npz, .h5, .aedat4 or .raw (EVT3)."""
+    size: tuple[int, int] | None = None
+    """Width and height of the sensor in pixels, where the file does not say."""
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None
+    """Unit of the times, where the file does not say."""
+    overwrite: bool = False
+    """Replace what exists."""
+    json: bool = False
+    """Print one JSON object."""
+
+
+def run(args: Args) -> int:
+    """Read, check and write."""
+    recording = open_recording(args.source, args.size, time_unit=args.time_unit)
+    fault = None
+    try:
+        write_recording(args.target, recording.packets(), recording.size, overwrite=args.overwrite)
+    except DamagedRecordingError as error:
+        fault = str(error)
+    facts = {
+        "events": recording.events or 0,
+        "dropped": recording.dropped,
+        "notes": recording.notes,
+        "fault": fault,
+    }
+    print_json(facts) if args.json else print_facts(str(args.target), facts)
+    if fault is not None:
+        note(f"{fault}; the events before it were written")
+    return USED_GOOD_PART if fault is not None else 0
