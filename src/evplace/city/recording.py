@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -16,14 +17,20 @@ from evplace.city.film import ZONE, Film, GeoPose, geo_pose
 from evplace.city.plan import VERSION, CitySettings, drive_name, drive_number
 from evplace.city.town import Town
 from evplace.events import Events, Size
-from evplace.images import Imager, frame_image
+from evplace.images import Imager, ImageSettings, frame_image
+from evplace.settings import to_dict
 from evplace.simulators.esim import PRESETS, Simulator
 from evplace.storage import GrowingArray, new_folder
 from evplace.tracks import Track
 from evplace.traverse import TraverseWriter, new_traverse
+from evplace.windows import WindowSettings
+from evplace.writers import write_recording
 
 COLOUR = "colour"
 """Folder of the colour traverse, beside one for each sensor."""
+
+PACKET = 1 << 17
+"""Events that are written at a time."""
 
 Tick = Callable[[float], None]
 """Is told the share of a drive that is done."""
@@ -42,7 +49,8 @@ def record_drive(out: Path, town: Town, settings: CitySettings, name: str, path:
             _Sensor(open_now, folder, preset, size, settings, drive_number(name, path), info)
             for preset in settings.sensors
         ]
-        colour = open_now.enter_context(new_traverse(folder / COLOUR, {**info, "sensor": COLOUR}))
+        colour_info = {**info, "input": "frames", "images": to_dict(ImageSettings())}
+        colour = open_now.enter_context(new_traverse(folder / COLOUR, colour_info))
         poses = np.array(_drive(film, settings, sensors, colour, drive_number(name, path), tick))
         for writer in (colour, *(sensor.writer for sensor in sensors)):
             writer.track = _track(np.array(colour.t_us), poses)
@@ -95,10 +103,17 @@ class _Sensor:
         self._simulator = Simulator(size, PRESETS[preset], settings.seed, number)
         self._imager = Imager(size)
         self._count = 0
-        self.writer = open_now.enter_context(new_traverse(folder / preset, {**info, "sensor": preset}))
-        self._events: _EventFiles | None = None
+        made = {
+            "input": "events",
+            "preset": preset,
+            "sensor": list(size),
+            "windows": to_dict(WindowSettings(settings.dt)),
+            "images": to_dict(ImageSettings()),
+        }
+        self.writer = open_now.enter_context(new_traverse(folder / preset, {**info, **made}))
+        self._events: _EventColumns | None = None
         if settings.keep_events:
-            self._events = open_now.enter_context(_event_files(folder / f"{preset}-events"))
+            self._events = open_now.enter_context(_recording(folder / f"{preset}.aedat4", size))
 
     def see(self, light: NDArray[np.float32], grey8: NDArray[np.uint8], t_us: int, opens_us: int) -> None:
         """Take a frame; events after `opens_us` belong to the next image."""
@@ -115,11 +130,12 @@ class _Sensor:
         self._count = 0
 
 
-class _EventFiles:
-    """Events as t_us.npy, x.npy, y.npy and p.npy."""
+class _EventColumns:
+    """Events as they come, a column a file, until the drive has ended."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir()
+        self._folder = folder
         kinds = {"t_us": np.int64, "x": np.uint16, "y": np.uint16, "p": np.bool_}
         self._arrays = {name: GrowingArray(folder / f"{name}.npy", kind, ()) for name, kind in kinds.items()}
 
@@ -127,18 +143,30 @@ class _EventFiles:
         for name, array in self._arrays.items():
             array.extend(getattr(events, name))
 
-    def close(self) -> None:
+    def packets(self, size: Size) -> Iterator[Events]:
+        """All events again, in order; nothing can be added any more."""
         for array in self._arrays.values():
             array.close()
+        columns = [np.load(self._folder / f"{name}.npy", mmap_mode="r") for name in self._arrays]
+        for start in range(0, len(columns[0]), PACKET):
+            t_us, x, y, p = (column[start : start + PACKET] for column in columns)
+            yield Events.of(t_us, x, y, p, size)
+
+    def discard(self) -> None:
+        for array in self._arrays.values():
+            array.discard()
+        shutil.rmtree(self._folder)
 
 
 @contextlib.contextmanager
-def _event_files(folder: Path) -> Iterator[_EventFiles]:
-    files = _EventFiles(folder)
+def _recording(path: Path, size: Size) -> Iterator[_EventColumns]:
+    """Columns that become the recording `path` when the block ends well."""
+    columns = _EventColumns(path.with_suffix(".columns"))
     try:
-        yield files
+        yield columns
+        write_recording(path, columns.packets(size), size)
     finally:
-        files.close()
+        columns.discard()
 
 
 def _track(t_us: NDArray[np.int64], poses: NDArray[np.float64]) -> Track:
