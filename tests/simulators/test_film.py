@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from evplace.errors import InputError, MissingExtraError
+from evplace.events import Events
+from evplace.simulators import frames as films
+from evplace.simulators.esim import simulate
+from evplace.simulators.frames import open_film
+
+
+def picture(k: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
+    y, x = np.mgrid[:48, :64]
+    return (128 + 100 * np.sin((x + k) / 6.0) * np.cos(y / 9.0)).astype(np.uint8)
+
+
+def write_images(folder: Path, count: int, times: list[float] | None = None) -> Path:
+    folder.mkdir()
+    for k in range(count):
+        Image.fromarray(picture(k)).save(folder / f"frame_{k:04d}.png")
+    if times is not None:
+        (folder / "timestamps.txt").write_text("".join(f"{t}\n" for t in times))
+    return folder
+
+
+def write_video(path: Path, count: int) -> Path:
+    av = pytest.importorskip("av")
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=50)
+        stream.width, stream.height, stream.pix_fmt, stream.bit_rate = 64, 48, "yuv420p", 4_000_000
+        for k in range(count):
+            frame = av.VideoFrame.from_ndarray(picture(k), format="gray")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return path
+
+
+def test_a_folder_with_times(tmp_path: Path) -> None:
+    film = open_film(write_images(tmp_path / "film", 4, [1.0, 1.01, 1.03, 1.06]))
+    assert film.size == (64, 48)
+    assert [t for t, _ in film] == [1_000_000, 1_010_000, 1_030_000, 1_060_000]
+    np.testing.assert_array_equal(next(iter(film))[1], picture(0))
+
+
+def test_a_folder_without_times_goes_by_its_rate(tmp_path: Path) -> None:
+    film = open_film(write_images(tmp_path / "film", 3), fps=100)
+    assert [t for t, _ in film] == [0, 10_000, 20_000]
+
+
+def test_colour_becomes_grey(tmp_path: Path) -> None:
+    (tmp_path / "film").mkdir()
+    for k in range(2):
+        Image.new("RGB", (8, 6), (255, 0, 10 * k)).save(tmp_path / "film" / f"{k}.png")
+    _, first = next(iter(open_film(tmp_path / "film")))
+    assert first.shape == (6, 8)
+    assert first[0, 0] == 76
+
+
+def test_a_video_has_its_own_times(tmp_path: Path) -> None:
+    film = open_film(write_video(tmp_path / "film.mp4", 6))
+    frames = list(film)
+    assert film.size == (64, 48)
+    assert [t for t, _ in frames] == [20_000 * k for k in range(6)]
+    assert np.abs(frames[3][1].astype(int) - picture(3)).mean() < 12
+
+
+def test_events_come_from_a_film(tmp_path: Path) -> None:
+    film = open_film(write_images(tmp_path / "film", 8))
+    assert len(Events.concatenate(list(simulate(film, film.size)))) > 100
+
+
+def test_real_frames_give_events(data: Path) -> None:
+    film = open_film(data / "frames" / "vid2e")
+    assert film.size == (240, 180)
+    assert len(list(film)) == 161
+
+
+def test_films_that_cannot_be_used_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no video or folder"):
+        open_film(tmp_path / "nothing.mp4")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="holds no images"):
+        open_film(tmp_path / "empty")
+    repeated = write_images(tmp_path / "repeated", 3, [1.0, 1.0, 2.0])
+    with pytest.raises(InputError, match="does not come after"):
+        open_film(repeated)
+    missing = write_images(tmp_path / "missing", 3, [1.0, 2.0])
+    with pytest.raises(InputError, match="2 times for 3 images"):
+        open_film(missing)
+    one = open_film(write_images(tmp_path / "one", 1))
+    with pytest.raises(InputError, match="two are needed at least, 1 came"):
+        list(simulate(one, one.size))
+
+
+def test_two_sizes_are_refused(tmp_path: Path) -> None:
+    folder = write_images(tmp_path / "film", 2)
+    Image.new("L", (32, 48)).save(folder / "frame_0002.png")
+    film = open_film(folder)
+    with pytest.raises(InputError, match="32x48 came to a sensor of 64x48"):
+        list(simulate(film, film.size))
+
+
+def test_a_video_that_cannot_be_decoded(tmp_path: Path) -> None:
+    pytest.importorskip("av")
+    (tmp_path / "noise.mp4").write_bytes(bytes(range(256)) * 40)
+    with pytest.raises(InputError, match="cannot decode the video"):
+        open_film(tmp_path / "noise.mp4")
+
+
+def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "av", None)
+    (tmp_path / "film.mp4").write_bytes(b"0")
+    with pytest.raises(MissingExtraError, match=r"evplace\[video\]"):
+        open_film(tmp_path / "film.mp4")
+    assert films.open_film is open_film
