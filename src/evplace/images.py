@@ -18,7 +18,7 @@ from evplace import representations
 from evplace.errors import SettingsError, TraverseError
 from evplace.events import Events, Size
 from evplace.representations import Representation
-from evplace.resampling import AxisMap, Resize, axis_map, resample_binary, resample_float
+from evplace.resampling import Resampler, Resize, axis_map
 
 KINDS = ("binary", "polarity", "count", "time-surface", "voxel")
 
@@ -76,7 +76,7 @@ class Imager:
         self.settings = settings or ImageSettings()
         self.size = size
         self._grid = _representation(size, self.settings)
-        self._rows, self._columns = _axis_maps(size, self.settings, self.settings.blur)
+        self._resampler = _resampler(size, self.settings, self.settings.blur)
 
     def add(self, events: Events) -> None:
         """Take events of the open window.
@@ -91,7 +91,7 @@ class Imager:
 
     def image_float(self, t_us: int) -> NDArray[np.float32]:
         """As `image`, as float32 in [0, 1] before the rounding to 256 steps."""
-        layers = [_resampled(grid, self._rows, self._columns) for grid in self._grid.channels(t_us)]
+        layers = [_resampled(self._resampler, grid) for grid in self._grid.channels(t_us)]
         self._grid.clear()
         return layers[0] if len(layers) == 1 else np.stack(layers, axis=-1)
 
@@ -112,19 +112,19 @@ def frame_image(frame: NDArray[np.uint8], settings: ImageSettings | None = None)
             f"this one is {frame.dtype} {frame.shape}"
         )
     layers = frame[..., None] if frame.ndim == 2 else frame
-    rows, columns = _axis_maps((frame.shape[1], frame.shape[0]), settings, blur=False)
+    resampler = _resampler((frame.shape[1], frame.shape[0]), settings, blur=False)
     grids = np.moveaxis(layers, -1, 0).astype(np.float32) / np.float32(255)
-    small = [_to_bytes(_resampled(np.ascontiguousarray(grid), rows, columns)) for grid in grids]
+    small = [_to_bytes(resampler.values(np.ascontiguousarray(grid))) for grid in grids]
     return small[0] if frame.ndim == 2 else np.stack(small, axis=-1)
 
 
-def _axis_maps(size: Size, settings: ImageSettings, blur: bool) -> tuple[AxisMap, AxisMap]:
+def _resampler(size: Size, settings: ImageSettings, blur: bool) -> Resampler:
     width, height = size
     kept = int(height * (1 - Fraction(settings.crop_bottom).limit_denominator(1000)))
     if kept < 1:
         raise SettingsError(f"'crop_bottom' {settings.crop_bottom} leaves nothing of {height} rows")
     rows = axis_map(height, kept, settings.height, blur, settings.resize)
-    return rows, axis_map(width, width, settings.width, blur, settings.resize)
+    return Resampler(rows, axis_map(width, width, settings.width, blur, settings.resize))
 
 
 def _representation(size: Size, settings: ImageSettings) -> Representation:
@@ -139,10 +139,8 @@ def _representation(size: Size, settings: ImageSettings) -> Representation:
     return representations.Binary(size)
 
 
-def _resampled(grid: NDArray[Any], rows: AxisMap, columns: AxisMap) -> NDArray[np.float32]:
-    if grid.dtype == np.uint8:
-        return resample_binary(grid, rows, columns)
-    return resample_float(grid, rows, columns)
+def _resampled(resampler: Resampler, grid: NDArray[Any]) -> NDArray[np.float32]:
+    return resampler.binary(grid) if grid.dtype == np.int8 else resampler.values(grid)
 
 
 def _to_bytes(image: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -1,7 +1,7 @@
 """What a window of events leaves on the sensor's grid: the paper's binary image and its rivals.
 
-Each takes events with `add`, and gives with `channels(t_us)` its grids (C, H, W) at the window's end: uint8
-holding 0 and 1, or float32 in [0, 1]. `clear` starts the next window.
+Each takes events with `add`, and gives with `channels(t_us)` its grids (C, H, W) at the window's end: int8
+holding 0 and -1 (set), or float32 in [0, 1]. `clear` starts the next window.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Binary:
     """1 where an event fell, whatever its sign (paper, Eq. 3)."""
 
     def __init__(self, size: Size) -> None:
-        self._grid = np.zeros((1, size[1], size[0]), np.uint8)
+        self._grid = np.zeros((1, size[1], size[0]), np.int8)
 
     def add(self, events: Events) -> None:
         """See Representation."""
@@ -55,7 +55,7 @@ class Polarity:
     """Two binary grids: where the pixel became darker, and where it became brighter."""
 
     def __init__(self, size: Size) -> None:
-        self._grid = np.zeros((2, size[1], size[0]), np.uint8)
+        self._grid = np.zeros((2, size[1], size[0]), np.int8)
 
     def add(self, events: Events) -> None:
         """See Representation."""
@@ -159,15 +159,19 @@ def _outside(events: Events) -> RecordingError:
 
 @njit(cache=True)
 def _inside(grid: Any, x: Any, y: Any) -> bool:
-    """Two vectorised maxima: cheaper than a test at each store."""
-    widest = np.uint16(0)
-    for value in x:
-        widest = max(widest, value)
-    highest = np.uint16(0)
-    for value in y:
-        highest = max(highest, value)
-    fits: bool = widest < grid.shape[1] and highest < grid.shape[0]
+    """Two maxima over all events: far cheaper than a test at each store."""
+    fits: bool = _largest(x) < grid.shape[1] and _largest(y) < grid.shape[0]
     return fits
+
+
+@njit(cache=True)
+def _largest(values: Any) -> Any:
+    """Written so that it compiles to vector code: max(), or a loop over the values themselves, does not."""
+    most = np.uint16(0)
+    for i in range(len(values)):
+        value = values[i]
+        most = value if value > most else most
+    return most
 
 
 @njit(cache=True)
@@ -176,7 +180,7 @@ def _mark(grid: Any, x: Any, y: Any) -> bool:
     if not _inside(grid, x, y):
         return False
     for i in range(len(x)):
-        grid[y[i], x[i]] = 1
+        grid[y[i], x[i]] = -1
     return True
 
 

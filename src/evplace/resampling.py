@@ -91,30 +91,60 @@ def _mirrored(index: int, n: int) -> int:
     return 2 * (n - 1) - index if index >= n else index
 
 
-def resample_binary(canvas: NDArray[np.uint8], rows: AxisMap, columns: AxisMap) -> NDArray[np.float32]:
-    """A canvas (H, W) of zeros and ones through both maps: (h, w) float32 in [0, 1]."""
-    if rows.total > np.iinfo(np.uint16).max:
-        return resample_float(canvas.astype(np.float32), rows, columns)
-    lines = np.empty((len(rows.start), canvas.shape[1]), np.uint16)
-    _resample_rows(canvas, rows.start, rows.weights.astype(np.uint16), lines)
-    # Turned, so that the horizontal pass too runs along contiguous memory.
-    sums = np.empty((len(columns.start), len(rows.start)), np.int64)
-    _resample_turned(np.ascontiguousarray(lines.T), columns.start, columns.weights, sums)
-    return np.ascontiguousarray(sums.T) * np.float32(1 / (rows.total * columns.total))
+class Resampler:
+    """One map for each axis, with the scratch that its passes need."""
 
+    def __init__(self, rows: AxisMap, columns: AxisMap) -> None:
+        """From canvases (H, W) to images (h, w)."""
+        self._rows, self._columns = rows, columns
+        # The narrowest whole numbers that hold every sum: the narrower, the more of them fit a vector.
+        kind = np.uint8 if rows.total < 1 << 8 else np.uint16 if rows.total < 1 << 16 else np.uint32
+        self._wide = np.uint16 if rows.total * columns.total < 1 << 16 else np.uint32
+        self._row_weights = rows.weights.astype(kind)
+        self._column_weights = columns.weights.astype(self._wide)
+        self._scale = np.float32(1 / (rows.total * columns.total))
 
-def resample_float(canvas: NDArray[np.float32], rows: AxisMap, columns: AxisMap) -> NDArray[np.float32]:
-    """A canvas (H, W) of any values through both maps: (h, w) float32."""
-    lines = np.empty((len(rows.start), canvas.shape[1]), np.float64)
-    _resample_float(canvas, rows.start, rows.weights / rows.total, lines)
-    sums = np.empty((len(columns.start), len(rows.start)), np.float64)
-    _resample_float(np.ascontiguousarray(lines.T), columns.start, columns.weights / columns.total, sums)
-    return np.ascontiguousarray(sums.T, np.float32)
+    def binary(self, canvas: NDArray[np.int8]) -> NDArray[np.float32]:
+        """A canvas (H, W) of 0 and -1 (set) -> (h, w) float32 in [0, 1]; exact but for the last division."""
+        if self._rows.total * self._columns.total >= 1 << 32:
+            return self.values(-canvas.astype(np.float32))
+        rows, columns = self._rows, self._columns
+        out = np.empty((len(rows.start), len(columns.start)), np.float32)
+        lines = np.empty((len(rows.start), canvas.shape[1]), self._row_weights.dtype)
+        sums = np.empty((len(columns.start), len(rows.start)), self._wide)
+        _resample_binary(
+            canvas, rows.start, self._row_weights, columns.start, self._column_weights, lines,
+            np.empty(lines.T.shape, lines.dtype), sums, self._scale, out,
+        )  # fmt: skip
+        return out
+
+    def values(self, canvas: NDArray[np.float32]) -> NDArray[np.float32]:
+        """A canvas (H, W) of any values -> (h, w) float32."""
+        rows, columns = self._rows, self._columns
+        lines = np.empty((len(rows.start), canvas.shape[1]), np.float64)
+        _weighted_rows(canvas, rows.start, rows.weights / rows.total, lines)
+        sums = np.empty((len(columns.start), len(rows.start)), np.float64)
+        _weighted_rows(np.ascontiguousarray(lines.T), columns.start, columns.weights / columns.total, sums)
+        return np.ascontiguousarray(sums.T, np.float32)
 
 
 @njit(cache=True)
-def _resample_rows(canvas: Any, start: Any, weights: Any, out: Any) -> None:
-    """Zeros and ones: sums stay in 16 bits, which is what lets this loop vectorise."""
+def _resample_binary(
+    canvas: Any, row_start: Any, row_weights: Any, column_start: Any, column_weights: Any, lines: Any,
+    turned: Any, sums: Any, scale: Any, out: Any,
+) -> None:  # fmt: skip
+    """Both passes run along contiguous memory: between them the lines are turned."""
+    _masked_rows(canvas, row_start, row_weights, lines)
+    _turn(lines, turned)
+    _weighted_rows(turned, column_start, column_weights, sums)
+    for j in range(sums.shape[0]):
+        for i in range(sums.shape[1]):
+            out[i, j] = np.float32(sums[j, i]) * scale
+
+
+@njit(cache=True)
+def _masked_rows(canvas: Any, start: Any, weights: Any, out: Any) -> None:
+    """-1 has all bits set: a mask costs less than a product, and keeps the sums as narrow as the weights."""
     for i in range(out.shape[0]):
         line = out[i]
         line[:] = 0
@@ -122,23 +152,11 @@ def _resample_rows(canvas: Any, start: Any, weights: Any, out: Any) -> None:
             weight = weights[i, tap]
             source = canvas[start[i] + tap]
             for x in range(len(line)):
-                line[x] = np.uint16(line[x] + np.uint16(weight * np.uint16(source[x])))
+                line[x] += weight & source[x]
 
 
 @njit(cache=True)
-def _resample_turned(lines: Any, start: Any, weights: Any, out: Any) -> None:
-    for j in range(out.shape[0]):
-        line = out[j]
-        line[:] = 0
-        for tap in range(weights.shape[1]):
-            weight = weights[j, tap]
-            source = lines[start[j] + tap]
-            for y in range(len(line)):
-                line[y] += weight * source[y]
-
-
-@njit(cache=True)
-def _resample_float(canvas: Any, start: Any, weights: Any, out: Any) -> None:
+def _weighted_rows(canvas: Any, start: Any, weights: Any, out: Any) -> None:
     for i in range(out.shape[0]):
         line = out[i]
         line[:] = 0
@@ -147,3 +165,10 @@ def _resample_float(canvas: Any, start: Any, weights: Any, out: Any) -> None:
             source = canvas[start[i] + tap]
             for x in range(len(line)):
                 line[x] += weight * source[x]
+
+
+@njit(cache=True)
+def _turn(lines: Any, turned: Any) -> None:
+    for j in range(turned.shape[0]):
+        for i in range(turned.shape[1]):
+            turned[j, i] = lines[i, j]
