@@ -4,6 +4,7 @@ Examples:
   evplace city -o city                                     the benchmark: two paths by day, night and rain
   evplace city -o small --route-length-m 300 --fps 60      minutes, not a quarter of an hour
   evplace city -o winter --conditions day snow --paths 1 --keep-events
+  evplace city --preview sheet.png                         what it looks like; .webp or .gif moves
 
 Each drive is a folder: a traverse for each sensor (ideal, weak, from-8bit) and for the colour camera, with
 the same times and the same truth. A call that was stopped goes on where it was when it is given again.
@@ -17,16 +18,19 @@ from typing import Annotated
 
 import tyro
 
-from evplace.city import CitySettings, generate
+from evplace.city import CitySettings, generate, moving_preview, preview
 from evplace.cli._output import print_json, progress
+from evplace.errors import SettingsError
 
 
 @dataclass(frozen=True)
 class Args:
     """Flags of `evplace city`."""
 
-    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+    out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """The folder for the drives; drives that are there already are kept."""
+    preview: Path | None = None
+    """Only write a picture: a contact sheet (.png), or a short drive (.webp, .gif)."""
     city: Annotated[CitySettings, tyro.conf.arg(name="")] = field(default_factory=CitySettings)
     settings: Path | None = None
     """A TOML file with any of these settings, in a table city."""
@@ -37,7 +41,13 @@ class Args:
 
 
 def run(args: Args) -> int:
-    """Make the drives that are not there yet."""
+    """Make the drives that are not there yet, or a picture of some."""
+    if args.preview is not None:
+        picture = moving_preview if args.preview.suffix in (".webp", ".gif") else preview
+        picture(args.preview, args.city.seed, args.city.conditions)
+        return 0
+    if args.out is None:
+        raise SettingsError("say where the drives go: evplace city -o FOLDER")
     with progress("driving") as show:
         drives = generate(
             args.out,

@@ -20,7 +20,7 @@ import tyro
 
 from evplace import settings as settings_room
 from evplace.capture import open_traverse
-from evplace.cli._output import print_facts, print_json, progress
+from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json, progress
 from evplace.errors import OutputError, TraverseError
 from evplace.images import ImageSettings
 from evplace.places import PlaceGrid, PlaceRuns, Places
@@ -95,6 +95,9 @@ def run(args: Args) -> int:
         "seconds": round(seconds, 1),
     }
     print_json(facts) if args.json else print_facts(str(args.out), facts)
+    if day.info.get("fault"):
+        note(f"{day.info['fault']}; what came before it was learned")
+        return USED_GOOD_PART
     return 0
 
 

@@ -1,0 +1,71 @@
+"""Simulate an event camera on a video or on a folder of images: an event recording.
+
+Examples:
+  evplace simulate drive.mp4 -o drive.aedat4                     videos need the extra 'video'
+  evplace simulate frames/ -o drive.npz --fps 120                images; timestamps.txt gives their times
+  evplace simulate frames/ -o night.aedat4 --preset weak --seed 1
+
+Frames must come so often that the image moves by less than a pixel between two of them; a remark says when
+they do not.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from evplace import settings as settings_room
+from evplace.cli._output import note, print_facts, print_json
+from evplace.simulators.esim import PRESETS, SensorSettings, simulate
+from evplace.simulators.frames import open_film
+from evplace.writers import write_recording
+
+
+@dataclass(frozen=True)
+class Args:
+    """Flags of `evplace simulate`."""
+
+    film: tyro.conf.Positional[Path]
+    """A video file, or a folder of images."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+    """The recording to write: .aedat4, .npz, .h5 or .raw (EVT3)."""
+    preset: Literal["ideal", "weak", "from-8bit"] = "from-8bit"
+    """The sensor; from-8bit is for gamma-coded frames, as videos are."""
+    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """A setting of the sensor over the preset's, as name=value: threshold_on=0.15."""
+    fps: float = 30.0
+    """Images a second of a folder without times."""
+    seed: int = 0
+    """Draws the pixels' thresholds and the noise."""
+    overwrite: bool = False
+    """Replace what exists."""
+    json: bool = False
+    """Print one JSON object."""
+
+
+def run(args: Args) -> int:
+    """Simulate and write."""
+    values = settings_room.from_pairs(args.set)
+    sensor = settings_room.make(SensorSettings, values, PRESETS[args.preset])
+    film = open_film(args.film, args.fps)
+    with warnings.catch_warnings(record=True) as remarks:
+        warnings.simplefilter("always")
+        packets = simulate(film, film.size, sensor, args.seed)
+        events = write_recording(args.out, packets, film.size, overwrite=args.overwrite)
+    for remark in remarks:
+        note(str(remark.message))
+    facts = {
+        "events": events,
+        "width": film.size[0],
+        "height": film.size[1],
+        "sensor": settings_room.to_dict(sensor),
+    }
+    if args.json:
+        print_json(facts)
+    else:
+        print_facts(str(args.out), {"events": events, "sensor": f"{film.size[0]} x {film.size[1]}"})
+    return 0
