@@ -3,10 +3,10 @@
     evplace city -o city                                   the benchmark city, about ten minutes
     python bench/city_table.py --city city --seeds 3 --out city-table
 
-The map is day-1. Accuracy in %, by the paper's rule (a cell or one of its eight neighbours; an image of a place
-that the map lacks counts as wrong here, since global-max never says so). Mean and standard deviation over the
-seeds. Nothing in the city or the sensors was changed after the first accuracy was seen. Finished rows are kept
-in --out and not made again.
+The map is day-1. Accuracy in %, by the paper's rule (a cell or one of its eight neighbours; an image of a
+place that the map lacks counts as wrong here, since global-max never says so). Mean and standard deviation
+over the seeds. Nothing in the city or the sensors was changed after the first accuracy was seen. Finished
+rows are kept in --out and not made again.
 """
 
 from __future__ import annotations

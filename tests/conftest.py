@@ -20,6 +20,7 @@ from evplace.tracks import Track
 from evplace.training import train
 from evplace.traverse import Traverse
 from evplace.windows import WindowSettings
+from evplace.writers import write_recording
 
 settings.register_profile("evplace", deadline=None)  # the first call of a numba loop compiles it
 settings.load_profile("evplace")
@@ -67,6 +68,17 @@ def make_drive(seed: int = 0, windows: int = 60, noise: float = 0.002) -> Drive:
     t_us = np.arange(windows + 2, dtype=np.int64) * 1_000_000 // 30
     road = np.stack([500_000 + 2.0 * np.arange(windows + 2), np.full(windows + 2, 4_000_000.0)], axis=1)
     return Drive(Events.concatenate([first, *parts]), Track.local(t_us, road))
+
+
+def write_drive(folder: Path, name: str, drive: Drive) -> tuple[Path, Path]:
+    """The recording, and its track as a csv log in the RobotCar layout."""
+    recording, track = folder / f"{name}.aedat4", folder / f"{name}.csv"
+    write_recording(recording, [drive.events], drive.events.size)
+    rows = ["timestamp,latitude,longitude"]
+    for t_us, easting in zip(drive.track.t_us, drive.track.easting, strict=True):
+        rows.append(f"{t_us},48.0,{11 + (easting - 500_000) / 74_600}")
+    track.write_text("\n".join(rows) + "\n")
+    return recording, track
 
 
 def make_traverse(drive: Drive) -> Traverse:

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from conftest import Drive, make_drive
+from conftest import Drive, make_drive, write_drive
 from evplace.placemap import PlaceMap
 from evplace.traverse import Traverse
-from evplace.writers import write_recording
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
@@ -20,17 +19,6 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 def ran(name: str, *arguments: object) -> str:
     command = [sys.executable, str(EXAMPLES / name), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
-
-
-def write_drive(folder: Path, name: str, drive: Drive) -> tuple[Path, Path]:
-    """The recording, and its track as a csv log in the RobotCar layout."""
-    recording, track = folder / f"{name}.aedat4", folder / f"{name}.csv"
-    write_recording(recording, [drive.events], drive.events.size)
-    rows = ["timestamp,latitude,longitude"]
-    for t_us, easting in zip(drive.track.t_us, drive.track.easting, strict=True):
-        rows.append(f"{t_us},48.0,{11 + (easting - 500_000) / 74_600}")
-    track.write_text("\n".join(rows) + "\n")
-    return recording, track
 
 
 def test_find_a_drive(tmp_path: Path, night_drive: Drive) -> None:

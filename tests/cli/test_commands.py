@@ -1,0 +1,160 @@
+"""Each command as a person types it, on small made drives."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from conftest import make_drive, write_drive
+from evplace.cli import commands, main
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(scope="session")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """day.aedat4, night.aedat4 and their logs, day.csv and night.csv."""
+    folder = tmp_path_factory.mktemp("files")
+    write_drive(folder, "day", make_drive())
+    write_drive(folder, "night", make_drive(seed=1, noise=0.02))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def street(files: Path) -> Path:
+    """A map of the day's images."""
+    arguments = ["train", f"{files}/day.aedat4", "--track", f"{files}/day.csv", "-o", f"{files}/street.evp"]
+    assert main([*arguments, "--scorer", "ncc"]) == 0
+    return files / "street.evp"
+
+
+def said(capsys: Capture, *arguments: object) -> Any:
+    """What a command prints with --json."""
+    capsys.readouterr()
+    assert main([*map(str, arguments), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_info(files: Path, capsys: Capture) -> None:
+    facts = said(capsys, "info", files / "day.aedat4")
+    assert {"format", "width", "height", "events", "t_first_us", "t_last_us", "dropped"} <= set(facts)
+    assert (facts["format"], facts["width"], facts["height"]) == ("aedat4", 80, 60)
+    assert facts["events"] == len(make_drive().events)
+    assert not any(facts["dropped"].values())
+    main(["info", str(files / "day.aedat4")])
+    assert "80 x 60" in capsys.readouterr().out
+
+
+def test_images(files: Path, tmp_path: Path, capsys: Capture) -> None:
+    sheet = tmp_path / "sheet.png"
+    out = ("images", files / "day.aedat4", "-o", tmp_path / "day", "--track", files / "day.csv")
+    facts = said(capsys, *out, "--sheet", sheet)
+    assert facts["images"] == 60
+    assert facts["with_position"] == 60
+    assert sheet.read_bytes().startswith(b"\x89PNG")
+    facts = said(capsys, *out, "--overwrite", "--dt", "1/15", "--width", "40")
+    assert (facts["images"], facts["shape"]) == (30, [90, 40])
+
+
+def test_settings_come_from_a_file_and_flags_win(files: Path, tmp_path: Path, capsys: Capture) -> None:
+    toml = tmp_path / "settings.toml"
+    toml.write_text('[windows]\ndt = "1/15"\n[images]\nwidth = 40\nblur = false\n')
+    out = ("images", files / "day.aedat4", "-o", tmp_path / "day", "--settings", toml)
+    assert said(capsys, *out)["shape"] == [90, 40]
+    assert said(capsys, *out, "--overwrite", "--width", "50")["shape"] == [90, 50]
+    info = json.loads((tmp_path / "day" / "traverse.json").read_text())["info"]
+    assert (info["windows"]["dt"], info["images"]["blur"]) == ("1/15", False)
+
+
+def test_train_localize_evaluate_compare(files: Path, street: Path, tmp_path: Path, capsys: Capture) -> None:
+    csv = tmp_path / "night.csv"
+    assert main(["localize", str(street), f"{files}/night.aedat4", "--matcher", "best", "-o", str(csv)]) == 0
+    lines = csv.read_text().splitlines()
+    assert lines[0] == "t_us,place,easting,northing,score,state"
+    assert len(lines) == 61
+    capsys.readouterr()
+    assert main(["localize", str(street), f"{files}/night.aedat4", "--matcher", "best", "--json"]) == 0
+    matches = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [match["place"] for match in matches] == [int(line.split(",")[1]) for line in lines[1:]]
+    query = ("evaluate", street, files / "night.aedat4", "--track", files / "night.csv")
+    figures = said(capsys, *query, "-o", tmp_path / "a.result", "--matcher", "best")
+    assert figures["accuracy"] > 0.95
+    said(capsys, *query, "-o", tmp_path / "b.result", "--matcher", "hmm", "--rule", "view")
+    rows = said(capsys, "compare", tmp_path / "a.result", tmp_path / "b.result")["results"]
+    assert [row["result"] for row in rows] == ["a.result", "b.result"]
+    assert rows[0]["matcher.name"] == "best"
+    assert main(["compare", f"{tmp_path}/a.result", f"{tmp_path}/b.result"]) == 0
+
+
+def test_a_traverse_is_answered_as_its_recording_is(
+    files: Path, street: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    main(["images", f"{files}/night.aedat4", "-o", f"{tmp_path}/night"])
+    capsys.readouterr()
+    answers = []
+    for drive in (files / "night.aedat4", tmp_path / "night"):
+        assert main(["localize", str(street), str(drive), "--matcher", "best"]) == 0
+        answers.append(capsys.readouterr().out)
+    assert answers[0] == answers[1]
+
+
+def test_the_network_from_the_command_line(files: Path, tmp_path: Path, capsys: Capture) -> None:
+    pytest.importorskip("torch", reason="the network needs the extra 'train'")
+    out = ("train", files / "day.aedat4", "--track", files / "day.csv", "-o", tmp_path / "net.evp")
+    facts = said(capsys, *out, "--preset", "paper", "--steps", 3, "--batch", 8)
+    assert (facts["scorer"], facts["items"]) == ("network", facts["places"])
+    train = json.loads((tmp_path / "net.evp" / "map.json").read_text())["settings"]["train"]
+    assert (train["last_relu"], train["steps"]) == (True, 3)
+
+
+def test_without_positions_and_by_frames(files: Path, tmp_path: Path, capsys: Capture) -> None:
+    out = ("train", files / "day.aedat4", "-o", tmp_path / "runs.evp", "--scorer", "sad")
+    assert said(capsys, *out, "--run-length", 10)["places"] == 6
+    query = ("evaluate", tmp_path / "runs.evp", files / "night.aedat4", "--matcher", "best")
+    assert said(capsys, *query, "-o", tmp_path / "a", "--frames", 2)["accuracy"] > 0.9
+    assert said(capsys, *query, "-o", tmp_path / "b")["accuracy"] > 0.9
+    np.save(tmp_path / "truth.npy", np.eye(60))
+    assert said(capsys, *query, "-o", tmp_path / "c", "--truth", tmp_path / "truth.npy")["recall@1"] > 0.5
+
+
+def test_convert_and_simulate_and_list(files: Path, tmp_path: Path, capsys: Capture) -> None:
+    assert said(capsys, "convert", files / "day.aedat4", tmp_path / "day.npz")["events"] > 0
+    assert said(capsys, "info", tmp_path / "day.npz")["format"] == "npz"
+    main(["images", f"{files}/day.aedat4", "-o", f"{tmp_path}/t"])
+    from PIL import Image
+
+    (tmp_path / "film").mkdir()
+    for number, image in enumerate(np.load(tmp_path / "t" / "images.npy")[:4]):
+        Image.fromarray(image).save(tmp_path / "film" / f"{number}.png")
+    assert said(capsys, "simulate", tmp_path / "film", "-o", tmp_path / "film.npz")["events"] > 0
+    assert "seqslam" in said(capsys, "list")["matchers"]
+
+
+@pytest.mark.parametrize("command", sorted(commands()))
+def test_help_shows_examples(command: str, capsys: Capture) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main([command, "--help"])
+    assert not stop.value.code
+    assert "Examples:" in capsys.readouterr().out
+
+
+def test_the_overview_is_light_and_complete() -> None:
+    code = (
+        "import sys; from evplace.cli import main; main(['--help']);"
+        "print([name for name in ('numba', 'tyro', 'numpy', 'torch') if name in sys.modules])"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert answer.splitlines()[-1] == "[]"
+    assert all(f"  {command} " in answer for command in commands())
+
+
+def test_version_and_module(capsys: Capture) -> None:
+    assert main(["--version"]) == 0
+    run = subprocess.run([sys.executable, "-m", "evplace", "--version"], capture_output=True, text=True)
+    assert run.stdout == capsys.readouterr().out

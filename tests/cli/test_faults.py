@@ -1,0 +1,289 @@
+"""What goes wrong for people: one clear line, exit code 2 (3 where a good part was used), no half outputs."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from conftest import make_drive, write_drive
+from evplace import storage
+from evplace.cli import main
+from evplace.events import Events
+from evplace.writers import write_recording
+
+Capture = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """day.aedat4 and day.csv, and nothing else."""
+    write_drive(tmp_path, "day", make_drive(windows=20))
+    return tmp_path
+
+
+@pytest.fixture
+def street(folder: Path) -> Path:
+    arguments = [
+        "train",
+        f"{folder}/day.aedat4",
+        "--track",
+        f"{folder}/day.csv",
+        "-o",
+        f"{folder}/street.evp",
+    ]
+    assert main([*arguments, "--scorer", "ncc"]) == 0
+    return folder / "street.evp"
+
+
+def fault(capsys: Capture, *arguments: object, code: int = 2) -> str:
+    """The one line on standard error of a command that fails."""
+    capsys.readouterr()
+    assert main([*map(str, arguments)]) == code
+    told = capsys.readouterr().err
+    assert "Traceback" not in told
+    lines = told.splitlines()
+    assert len(lines) == 1, told
+    assert lines[0].startswith("evplace: ")
+    return lines[0]
+
+
+def left(folder: Path) -> list[str]:
+    """Names in a folder; an empty lock file is no output."""
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_commands_and_flags(folder: Path, capsys: Capture) -> None:
+    assert "did you mean 'train'" in fault(capsys, "trian")
+    assert "--out" in fault(capsys, "images", folder / "day.aedat4")
+    assert "--dtt" in fault(capsys, "images", folder / "day.aedat4", "-o", folder / "x", "--dtt", "1")
+    assert "'dt'" in fault(capsys, "images", folder / "day.aedat4", "-o", folder / "x", "--dt", "soon")
+    assert "crop_bottom" in fault(
+        capsys, "images", folder / "day.aedat4", "-o", folder / "x", "--crop-bottom", "1.5"
+    )
+    assert "nothing to compare" in fault(capsys, "compare")
+    assert left(folder) == ["day.aedat4", "day.csv"]
+
+
+def test_settings_files(folder: Path, capsys: Capture) -> None:
+    toml = folder / "s.toml"
+    start = ("images", folder / "day.aedat4", "-o", folder / "x", "--settings", toml)
+    assert "cannot read" in fault(capsys, *start)
+    toml.write_text("[windows\n")
+    assert "is not TOML" in fault(capsys, *start)
+    toml.write_text("[windows]\nlength = 3\n")
+    assert "unknown setting 'length'" in fault(capsys, *start)
+    toml.write_text("[colours]\n")
+    assert "known are" in fault(capsys, *start)
+
+
+def test_files_that_are_no_recordings(folder: Path, capsys: Capture) -> None:
+    (folder / "empty.aedat4").write_bytes(b"")
+    (folder / "text.aedat4").write_text("good day\n")
+    for name, said in [("none.aedat4", "none.aedat4"), ("empty.aedat4", "empty"), ("text.aedat4", "known")]:
+        for command in (["info"], ["images", "-o", folder / "x"], ["train", "-o", folder / "x"]):
+            told = fault(capsys, command[0], folder / name, *command[1:])
+            assert said in told
+    assert not (folder / "x").exists()
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+def test_a_cut_recording_gives_its_good_part(
+    folder: Path, street: Path, capsys: Capture, share: float
+) -> None:
+    events = make_drive(windows=20).events
+    packets = [events[n : n + 500] for n in range(0, len(events), 500)]
+    cut = folder / "cut.aedat4"
+    write_recording(folder / "many.aedat4", packets, events.size)
+    content = (folder / "many.aedat4").read_bytes()
+    cut.write_bytes(content[: int(share * len(content))])
+    assert "cut" in fault(capsys, "info", cut, code=3)
+    assert main(["images", str(cut), "-o", f"{folder}/x", "--json"]) == 3
+    facts = json.loads(capsys.readouterr().out)
+    assert 0 < facts["images"] < 20
+    assert facts["fault"]
+    assert main(["localize", str(street), str(cut), "--matcher", "best"]) == 3
+    assert len(capsys.readouterr().out.splitlines()) == facts["images"] + 1
+    arguments = ["evaluate", str(street), str(cut), "--track", f"{folder}/day.csv", "-o", f"{folder}/r"]
+    assert main([*arguments, "--matcher", "best"]) == 3
+    assert main(["convert", str(cut), f"{folder}/cut.npz"]) == 3
+    assert (
+        main(["train", str(cut), "--track", f"{folder}/day.csv", "-o", f"{folder}/m", "--scorer", "sad"]) == 3
+    )
+
+
+def test_events_that_cannot_be(folder: Path, capsys: Capture) -> None:
+    """Coordinates out of range and times running backwards are dropped and counted, never used."""
+    events = make_drive(windows=4).events
+    x = events.x.copy()
+    x[100:103] = 500
+    t_us = events.t_us.copy()
+    t_us[200:205] -= 20_000
+    np.savez(folder / "odd.npz", t_us=t_us, x=x, y=events.y, p=events.p, width=80, height=60)
+    capsys.readouterr()
+    assert main(["info", f"{folder}/odd.npz", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["dropped"]["out_of_range"] == 3
+    assert facts["dropped"]["backwards"] == 5
+    assert facts["events"] == len(events) - 8
+
+
+def test_times_wrap(folder: Path, capsys: Capture) -> None:
+    """EVT3's 24 bits of time wrap every 16.8 s."""
+    t_us = np.arange(0, 60_000_000, 2_000, dtype=np.int64)
+    n = len(t_us)
+    long = Events.of(t_us, np.arange(n) % 80, np.arange(n) % 60, np.arange(n) % 2, (80, 60))
+    write_recording(folder / "long.raw", [long], (80, 60))
+    capsys.readouterr()
+    assert main(["info", f"{folder}/long.raw", "--json"]) == 0
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["t_last_us"] - facts["t_first_us"] == t_us[-1]
+
+
+def test_tracks(folder: Path, capsys: Capture) -> None:
+    start = ("train", folder / "day.aedat4", "-o", folder / "m", "--scorer", "sad")
+    assert "no positions" in fault(capsys, *start)
+    assert "none.csv" in fault(capsys, *start, "--track", folder / "none.csv")
+    later = (folder / "day.csv").read_text().splitlines()
+    moved = [later[0], *(f"{int(line.split(',')[0]) + 10**12},{line.split(',', 1)[1]}" for line in later[1:])]
+    (folder / "later.csv").write_text("\n".join(moved))
+    told = fault(capsys, *start, "--track", folder / "later.csv")
+    assert "do not overlap" in told
+    lost = [later[0], *(f"{line.split(',')[0]},nan,nan" for line in later[1:])]
+    (folder / "lost.csv").write_text("\n".join(lost))
+    assert "lost.csv" in fault(capsys, *start, "--track", folder / "lost.csv")
+    (folder / "nofix.nmea").write_text("$GPRMC,134730.361,V,,,,,,,041112,,,N*4C\n")
+    assert "nofix.nmea" in fault(capsys, *start, "--track", folder / "nofix.nmea")
+    assert not (folder / "m").exists()
+
+
+def test_one_place_only_is_a_map(folder: Path, capsys: Capture) -> None:
+    arguments = ["train", f"{folder}/day.aedat4", "--track", f"{folder}/day.csv", "-o", f"{folder}/m"]
+    assert main([*arguments, "--scorer", "sad", "--cell-m", "1e6", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["places"] == 1
+
+
+def test_a_query_of_another_town(folder: Path, street: Path, capsys: Capture) -> None:
+    lines = (folder / "day.csv").read_text().splitlines()
+    away = [lines[0], *(line.replace(",48.0,", ",49.0,") for line in lines[1:])]
+    (folder / "away.csv").write_text("\n".join(away))
+    told = fault(
+        capsys, "evaluate", street, folder / "day.aedat4", "--track", folder / "away.csv", "-o", folder / "r"
+    )
+    assert "share no ground" in told
+    assert "no positions" in fault(capsys, "evaluate", street, folder / "day.aedat4", "-o", folder / "r")
+    np.save(folder / "t.npy", np.eye(3))
+    told = fault(
+        capsys, "evaluate", street, folder / "day.aedat4", "--truth", folder / "t.npy", "-o", folder / "r"
+    )
+    assert "(3, 3)" in told
+
+
+def test_zero_images(folder: Path, capsys: Capture) -> None:
+    write_recording(folder / "none.npz", [], (80, 60))
+    told = fault(capsys, "images", folder / "none.npz", "-o", folder / "x")
+    assert "no image" in told or "no event" in told
+    (folder / "pictures").mkdir()
+    fault(capsys, "images", folder / "pictures", "-o", folder / "x")
+    assert not (folder / "x").exists()
+
+
+def test_a_map_of_other_settings_or_of_another_sensor(folder: Path, street: Path, capsys: Capture) -> None:
+    main(["images", f"{folder}/day.aedat4", "-o", f"{folder}/narrow", "--width", "40"])
+    assert "image settings" in fault(capsys, "localize", street, folder / "narrow")
+    other = Events.of([0, 5], [0, 1], [0, 1], [1, 1], (320, 240))
+    write_recording(folder / "other.aedat4", [other], (320, 240))
+    assert "80x60" in fault(capsys, "localize", street, folder / "other.aedat4")
+
+
+@pytest.mark.parametrize("name", ["weights.safetensors", "network.onnx", "map.json"])
+def test_a_flipped_byte_in_a_map(folder: Path, capsys: Capture, name: str) -> None:
+    pytest.importorskip("torch", reason="the network needs the extra 'train'")
+    arguments = ["train", f"{folder}/day.aedat4", "--track", f"{folder}/day.csv", "-o", f"{folder}/m"]
+    assert main([*arguments, "--steps", "1", "--batch", "4"]) == 0
+    file = folder / "m" / name
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 4
+    file.write_bytes(content)
+    assert name in fault(capsys, "localize", folder / "m", folder / "day.aedat4")
+
+
+def test_what_is_no_map_or_result(folder: Path, capsys: Capture) -> None:
+    assert "is no map" in fault(capsys, "localize", folder, folder / "day.aedat4")
+    fault(capsys, "compare", folder)
+
+
+def test_an_output_that_exists(folder: Path, street: Path, capsys: Capture) -> None:
+    day, track = folder / "day.aedat4", ("--track", folder / "day.csv")
+    taken = folder / "taken"
+    taken.mkdir()
+    (taken / "mine").write_text("mine")
+    for command in (
+        ("images", day, "-o", taken),
+        ("train", day, *track, "-o", taken, "--scorer", "sad"),
+        ("evaluate", street, day, *track, "-o", taken),
+        ("localize", street, day, "-o", taken),
+        ("convert", day, folder / "day.csv", ),
+    ):  # fmt: skip
+        told = fault(capsys, *command)
+        assert "exists" in told or "suffix" in told
+    assert (taken / "mine").read_text() == "mine"
+
+
+def test_a_full_disk(folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(storage.GrowingArray, "append", full)
+    monkeypatch.setattr(storage.GrowingArray, "extend", full)
+    before = left(folder)
+    assert "the disk is full" in fault(capsys, "images", folder / "day.aedat4", "-o", folder / "x")
+    assert left(folder) == before
+
+
+def test_a_second_writer(folder: Path, capsys: Capture) -> None:
+    with storage.new_folder(folder / "x"):
+        run = subprocess.run(
+            [sys.executable, "-m", "evplace", "images", folder / "day.aedat4", "-o", folder / "x"],
+            capture_output=True, text=True,
+        )  # fmt: skip
+    assert run.returncode == 2
+    assert "another process" in run.stderr
+
+
+def until(condition: Callable[[], bool]) -> None:
+    for _ in range(1200):
+        if condition():
+            return
+        time.sleep(0.05)
+    raise AssertionError("it did not happen within a minute")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to one process")
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_a_training_that_was_stopped_goes_on(folder: Path, how: signal.Signals) -> None:
+    pytest.importorskip("torch", reason="the network needs the extra 'train'")
+    day = ["train", folder / "day.aedat4", "--track", folder / "day.csv", "--batch", "8"]
+    command = [sys.executable, "-m", "evplace", *map(str, [*day, "--steps", "400"])]
+    process = subprocess.Popen([*command, "-o", folder / "stopped"], stderr=subprocess.PIPE, text=True)
+    until((folder / ".stopped.checkpoint").exists)
+    process.send_signal(how)
+    _, told = process.communicate(timeout=60)
+    if how == signal.SIGINT:
+        assert process.returncode == 130
+        assert told.splitlines() == ["evplace: interrupted; nothing half-written was left"]
+    assert not (folder / "stopped").exists()
+    for name in ("stopped", "whole"):
+        subprocess.run([*command, "-o", folder / name], check=True, capture_output=True)
+    stopped, whole = ((folder / name / "network.onnx").read_bytes() for name in ("stopped", "whole"))
+    assert stopped == whole
+    assert not (folder / ".stopped.checkpoint").exists()
