@@ -1,0 +1,62 @@
+"""Frames to events against eventify-dvs and eventcv: python bench/bench_simulator.py
+
+320x240, 8 bits, one core; each simulates the same 200 frames, without noise, in alternation. eventify-dvs
+compares two frames at a time and forgets what stays below the threshold, so it gives far fewer events: the
+time for an event stands beside that for a frame.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import cv2
+import eventcv
+import numpy as np
+from eventify.dvs import frame_to_event_tuples
+from numpy.typing import NDArray
+
+from evplace.simulators.esim import SensorSettings, Simulator
+from harness import alternate, report
+
+FRAMES, STEP_US = 200, 4000
+CLEAN = SensorSettings(threshold_spread=0.0, noise_hz=0.0, log_eps=1 / 255)
+
+
+def film() -> NDArray[np.uint8]:
+    """A blurred random pattern that moves by half a pixel a frame."""
+    rng = np.random.default_rng(0)
+    blocks = np.kron(rng.integers(0, 256, (40, 60)), np.ones((8, 8))).astype(np.uint8)
+    wide = cv2.GaussianBlur(blocks, (0, 0), 2)
+    moves = (np.float32([[1, 0, -k / 2], [0, 1, -k / 8]]) for k in range(FRAMES))
+    return np.array([cv2.warpAffine(wide, move, (320, 240)) for move in moves])
+
+
+def main() -> None:
+    cv2.setNumThreads(1)
+    frames = film()
+
+    def ours() -> int:
+        sensor = Simulator((320, 240), CLEAN)
+        return sum(len(sensor.push(frame, k * STEP_US)) for k, frame in enumerate(frames))
+
+    def eventify() -> int:
+        pairs = enumerate(itertools.pairwise(frames))
+        return sum(
+            len(frame_to_event_tuples(a, b, k * STEP_US, (k + 1) * STEP_US, c_thresh=0.2))
+            for k, (a, b) in pairs
+        )
+
+    def cv() -> int:
+        clean = {"sigma_thres": 0.0, "leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0}
+        return len(eventcv.simulate(frames, fps=1e6 / STEP_US, **clean))
+
+    peers = {"evplace": ours, "eventify-dvs": eventify, "eventcv.simulate": cv}
+    timings = alternate(peers)
+    report(f"{FRAMES} frames of 320x240, CPU time a frame", timings, FRAMES / 1e3, "ms")
+    for name, simulate in peers.items():
+        events = simulate()
+        print(f"  {name:<34} {events:>9,} events, {timings[name].median / events * 1e9:.0f} ns an event")
+
+
+if __name__ == "__main__":
+    main()
