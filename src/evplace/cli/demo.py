@@ -25,7 +25,7 @@ from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid
 from evplace.storage import new_file, write_json
-from evplace.training import TrainSettings, train
+from evplace.training import PRESETS, train
 from evplace.traverse import Traverse
 from evplace.trial import evaluate
 
@@ -33,6 +33,7 @@ QUERIES = ("night-1", "rain-1", "day-2", "night-2", "rain-2")
 INPUTS = {"events": "ideal", "colour": "colour"}
 """Input -> the traverse of each drive that holds it."""
 MATCHERS = {"global-max": ("best", None), "Algorithm 1": ("local", "paper")}
+TRAINING = PRESETS["paper"]
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,6 @@ def built_in_drives(folder: Path, drive_m: float) -> dict[str, Path]:
 
 def _maps(args: Args, day: Path) -> Iterator[tuple[str, PlaceMap]]:
     """The map of each input, learned as the paper says; one that is there already is read."""
-    settings = TrainSettings(last_relu=True, seed=args.seed)
     for name, part in INPUTS.items():
         file = args.out / f"{name}.evp"
         if file.exists():
@@ -95,7 +95,8 @@ def _maps(args: Args, day: Path) -> Iterator[tuple[str, PlaceMap]]:
             place_map = train(
                 traverse,
                 PlaceGrid.from_track(traverse.track),
-                settings=settings,
+                settings=TRAINING,
+                seed=args.seed,
                 progress=functools.partial(_training_step, show),
                 checkpoint=args.out / f".{name}.checkpoint",
             )
