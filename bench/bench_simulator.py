@@ -1,8 +1,6 @@
 """Frames to events against eventify-dvs and eventcv: python bench/bench_simulator.py
 
-320x240, 8 bits, one core; each simulates the same 200 frames, without noise, in alternation. eventify-dvs
-compares two frames at a time and forgets what stays below the threshold, so it gives far fewer events: the
-time for an event stands beside that for a frame.
+320x240, 8 bits, one core; each simulates the same 200 frames, without noise, in alternation.
 """
 
 from __future__ import annotations
@@ -19,6 +17,8 @@ from evplace.simulators.esim import SensorSettings, Simulator
 from harness import alternate, report
 
 FRAMES, STEP_US = 200, 4000
+AS_MANY = 0.085
+"""eventify-dvs forgets what is left of a change at each frame; with this threshold it gives about as many."""
 CLEAN = SensorSettings(threshold_spread=0.0, noise_hz=0.0, log_eps=1 / 255)
 
 
@@ -39,23 +39,24 @@ def main() -> None:
         sensor = Simulator((320, 240), CLEAN)
         return sum(len(sensor.push(frame, k * STEP_US)) for k, frame in enumerate(frames))
 
-    def eventify() -> int:
+    def eventify(threshold: float) -> int:
         pairs = enumerate(itertools.pairwise(frames))
-        return sum(
-            len(frame_to_event_tuples(a, b, k * STEP_US, (k + 1) * STEP_US, c_thresh=0.2))
-            for k, (a, b) in pairs
-        )
+        times = ((k * STEP_US, (k + 1) * STEP_US, a, b) for k, (a, b) in pairs)
+        return sum(len(frame_to_event_tuples(a, b, t0, t1, c_thresh=threshold)) for t0, t1, a, b in times)
 
     def cv() -> int:
         clean = {"sigma_thres": 0.0, "leak_rate_hz": 0.0, "shot_noise_rate_hz": 0.0}
         return len(eventcv.simulate(frames, fps=1e6 / STEP_US, **clean))
 
-    peers = {"evplace": ours, "eventify-dvs": eventify, "eventcv.simulate": cv}
-    timings = alternate(peers)
+    functions = {
+        "evplace": ours,
+        "eventify-dvs, same threshold": lambda: eventify(0.2),
+        "eventify-dvs, as many events": lambda: eventify(AS_MANY),
+        "eventcv.simulate": cv,
+    }
+    print({name: function() for name, function in functions.items()}, "events")
+    timings = alternate(functions)
     report(f"{FRAMES} frames of 320x240, CPU time a frame", timings, FRAMES / 1e3, "ms")
-    for name, simulate in peers.items():
-        events = simulate()
-        print(f"  {name:<34} {events:>9,} events, {timings[name].median / events * 1e9:.0f} ns an event")
 
 
 if __name__ == "__main__":
