@@ -158,3 +158,16 @@ def test_version_and_module(capsys: Capture) -> None:
     assert main(["--version"]) == 0
     run = subprocess.run([sys.executable, "-m", "evplace", "--version"], capture_output=True, text=True)
     assert run.stdout == capsys.readouterr().out
+
+
+def test_a_folder_of_images_with_a_list(tmp_path: Path, capsys: Capture) -> None:
+    from PIL import Image
+
+    (tmp_path / "film").mkdir()
+    for number in range(4):
+        Image.fromarray(np.full((12, 16), number, np.uint8)).save(tmp_path / "film" / f"{number}.png")
+    (tmp_path / "list.csv").write_text("name,index\n2.png,0\n0.png,1\n")
+    command = ("images", tmp_path / "film", "-o", tmp_path / "t", "--list", tmp_path / "list.csv")
+    assert said(capsys, *command, "--fps", 10)["images"] == 2
+    assert np.load(tmp_path / "t" / "images.npy")[:, 0, 0].tolist() == [2, 0]
+    assert np.load(tmp_path / "t" / "t_us.npy").tolist() == [0, 100_000]

@@ -15,11 +15,13 @@ from typing import Annotated, Literal
 
 import tyro
 
-from evplace.capture import record
+from evplace.capture import record, record_frames
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
+from evplace.frames import is_frames, open_frames
 from evplace.images import ImageSettings
 from evplace.sheets import contact_sheet
-from evplace.traverse import Traverse, new_traverse
+from evplace.tracks import open_track
+from evplace.traverse import Traverse, TraverseWriter, new_traverse
 from evplace.windows import WindowSettings
 
 
@@ -37,6 +39,10 @@ class Args:
     """Width and height of the sensor in pixels, where the file does not say."""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
     """Unit of the times, where the file does not say."""
+    list: Path | None = None
+    """For a folder of images: a .csv or .txt whose first column names the images to take, in order."""
+    fps: float = 30.0
+    """For a folder of images without timestamps.txt: images a second."""
     sheet: Path | None = None
     """Also write a .png that shows some of the images."""
     windows: Annotated[WindowSettings, tyro.conf.arg(name="")] = field(default_factory=WindowSettings)
@@ -52,7 +58,7 @@ class Args:
 def run(args: Args) -> int:
     """Write the traverse, and the sheet if asked."""
     with new_traverse(args.out, {}, args.overwrite) as writer:
-        fault = record(args.source, writer, args.track, args.windows, args.images, args.size, args.time_unit)
+        fault = _record(args, writer)
     traverse = Traverse.load(args.out)
     if args.sheet is not None:
         contact_sheet(traverse.images, args.sheet, args.overwrite)
@@ -72,3 +78,12 @@ def run(args: Args) -> int:
     if fault is not None:
         note(f"{fault}; the images before it were written")
     return USED_GOOD_PART if fault is not None else 0
+
+
+def _record(args: Args, writer: TraverseWriter) -> str | None:
+    """Write the images; returns what broke off, if anything."""
+    if not is_frames(args.source):
+        return record(args.source, writer, args.track, args.windows, args.images, args.size, args.time_unit)
+    track = open_track(args.track) if args.track is not None else None
+    record_frames(open_frames(args.source, args.list, args.fps), args.source, writer, args.images, track)
+    return None
