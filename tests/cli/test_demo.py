@@ -12,6 +12,7 @@ from evplace.cli import demo, main
 from evplace.traverse import Traverse
 
 pytest.importorskip("torch", reason="the network needs the extra 'train'")
+pytest.importorskip("matplotlib", reason="the chart needs the extra 'report'")
 
 
 @pytest.fixture
@@ -35,6 +36,7 @@ def test_the_demo_keeps_what_it_prints(drives: Path, capsys: pytest.CaptureFixtu
     rows = json.loads((drives / "demo" / "result.json").read_text())["rows"]
     assert len(rows) == len(demo.QUERIES) * len(demo.MATCHERS) * len(demo.INPUTS)
     assert set(rows[0]) >= {"query", "input", "matcher", "accuracy", "accuracy_seen", "rejected", "n"}
+    assert (drives / "demo" / "report.png").read_bytes().startswith(b"\x89PNG")
     assert (drives / "demo" / "events.evp" / "network.onnx").exists()
     assert len(list((drives / "demo" / "results").iterdir())) == len(rows)
     assert main(["demo", "--out", f"{drives}/demo", "--json"]) == 0

@@ -5,8 +5,8 @@ Examples:
   evplace demo --out demo --seed 1
   evplace demo --drive-m 600            a longer street: more places, more time
 
-Nothing is downloaded: the drives are made by the virtual city. The folder keeps result.json, the maps, the
-results of each row, and report.html.
+Nothing is downloaded: the drives are made by the virtual city. The folder keeps result.json, report.png, the
+maps, and the result of each row.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from evplace.charts import accuracy_chart
 from evplace.city import CitySettings, generate
 from evplace.cli._output import Show, print_json, print_table, progress
 from evplace.errors import OutputError
@@ -64,6 +65,7 @@ def run(args: Args) -> int:
     rows.sort(key=lambda row: (QUERIES.index(str(row["query"])), str(row["matcher"]) != "global-max"))
     with new_file(args.out / "result.json", overwrite=True) as partial:
         write_json(partial, {"rows": rows, "seed": args.seed, "drive_m": args.drive_m})
+    accuracy_chart(rows, args.out / "report.png")
     if args.json:
         print_json({"rows": rows})
         return 0
@@ -117,7 +119,8 @@ def _row(query: str, name: str, matcher: str, result: Result) -> dict[str, objec
         "accuracy": figures["accuracy"],
         "accuracy_seen": figures["accuracy_seen"],
         "rejected": figures["rejection_rate"],
-        "chance": figures["chance_seen"],
+        "chance": figures["chance"],
+        "chance_seen": figures["chance_seen"],
         "n": figures["judged"],
     }
 
@@ -129,10 +132,10 @@ def _print(rows: list[dict[str, object]], out: Path) -> None:
     for query, matcher in itertools.product(QUERIES, MATCHERS):
         cells = [by_key[query, matcher, name] for name in INPUTS]
         shown = [cell[figure] for figure in ("accuracy", "accuracy_seen") for cell in cells]
-        table.append([query, matcher, *map(_percent, shown), _percent(cells[0]["chance"])])
+        table.append([query, matcher, *map(_percent, shown), _percent(cells[0]["chance_seen"])])
     columns = ("query", "matcher", *INPUTS, "events, seen", "colour, seen", "chance, seen")
     print_table("Accuracy in %: the map is day-1, the query as named", columns, table)
-    print(f"Kept in {out}: result.json, the maps and the results. The same in Python:\n")
+    print(f"Kept in {out}: result.json, report.png, the maps and the results. The same in Python:\n")
     print(
         f"  import evplace as ev\n"
         f'  day = ev.open_traverse("{out}/city/day-1/ideal")\n'
