@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
@@ -25,10 +26,11 @@ from numpy.typing import NDArray
 from evplace.events import Events, Size
 from evplace.images import Imager
 from evplace.readers import open_recording
+from evplace.windows import TimeWindows
 from harness import alternate, report
 
 SET = 0.17
-"""Share of the pixels that one window sets: what real windows of 1/30 s show in city traffic."""
+"""Share of the pixels that one generated window sets."""
 WINDOWS = 10
 REPEATS = 20
 """Passes over the windows in one timing."""
@@ -48,24 +50,25 @@ def generated(size: Size) -> list[Events]:
 
 
 def recorded(path: Path) -> list[Events]:
-    """A recording's first windows of so many events that they set about `SET` of the pixels."""
-    windows: list[Events] = []
+    """A recording's first whole windows of 1/30 s."""
     recording = open_recording(path)
-    rest = Events.empty(recording.size)
+    cutter, pieces, windows = TimeWindows(Fraction(1, 30)), [], []
     for packet in recording.packets():
-        rest = Events.concatenate([rest, packet])
-        while (n := _enough(rest)) and len(windows) < WINDOWS:
-            windows.append(Events.of(rest.t_us[:n], rest.x[:n], rest.y[:n], rest.p[:n], rest.size))
-            rest = rest[n:]
-    return windows or [rest]
+        for piece, window in cutter.push(packet):
+            pieces.append(piece)
+            if window is not None:
+                windows.append(Events.concatenate(pieces))
+                pieces = []
+        if len(windows) >= WINDOWS:
+            break
+    return windows[:WINDOWS]
 
 
-def _enough(events: Events) -> int:
-    """How many events set `SET` of the pixels; 0 where all of them do not."""
-    pixel = events.y.astype(np.int64) * events.size[0] + events.x
-    first = np.sort(np.unique(pixel, return_index=True)[1])
-    wanted = round(SET * events.size[0] * events.size[1])
-    return int(first[wanted - 1]) + 1 if len(first) >= wanted else 0
+def share_set(windows: list[Events]) -> float:
+    """Mean share of the pixels at which a window has events."""
+    pixels = windows[0].size[0] * windows[0].size[1]
+    distinct = [len(np.unique(w.y.astype(np.int64) * w.size[0] + w.x)) for w in windows]
+    return float(np.mean(distinct)) / pixels
 
 
 def small(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -156,8 +159,11 @@ def bench(title: str, windows: list[Events]) -> None:
     images = {n: len(windows) * slow.get(n, REPEATS) for n in work}
     timings = alternate({n: partial(run_all, f, slow.get(n, REPEATS)) for n, f in work.items()}, rounds=7)
     each = {name: type(t)(tuple(s / images[name] for s in t.seconds)) for name, t in timings.items()}
-    mean = sum(map(len, windows)) / len(windows)
-    title = f"{title}: {windows[0].size[0]}x{windows[0].size[1]}, {mean:,.0f} events a window"
+    mean, (width, height) = sum(map(len, windows)) / len(windows), windows[0].size
+    share = share_set(windows)
+    title = (
+        f"{title}: {width}x{height}, {len(windows)} windows of {mean:,.0f} events, {share:.1%} of pixels set"
+    )
     names = list(each)
     report(title, {name: each[name] for name in names[:4]}, 1e-6, "us")
     report("  accumulation alone", {name: each[name] for name in names[4:]}, 1e-6, "us")

@@ -12,6 +12,7 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from evplace import representations
@@ -144,4 +145,12 @@ def _resampled(resampler: Resampler, grid: NDArray[Any]) -> NDArray[np.float32]:
 
 
 def _to_bytes(image: NDArray[np.float32]) -> NDArray[np.uint8]:
-    return (image * np.float32(255) + np.float32(0.5)).astype(np.uint8)
+    small = np.empty(image.shape, np.uint8)
+    _round(image.reshape(-1), small.reshape(-1))
+    return small
+
+
+@njit(cache=True)
+def _round(image: Any, small: Any) -> None:
+    for i in range(len(image)):
+        small[i] = np.int32(image[i] * np.float32(255) + np.float32(0.5))
