@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from evplace.events import Events, Size
 
 ABOUT = "numpy archive with arrays t_us, x, y, p, width, height"
 SUFFIX = ".npz"
-FIELDS = (
+FIELDS: tuple[tuple[str, np.dtype[Any]], ...] = (
     ("t_us", np.dtype(np.int64)),
     ("x", np.dtype(np.uint16)),
     ("y", np.dtype(np.uint16)),
@@ -43,7 +44,7 @@ def write(path: Path, packets: Iterable[Events], size: Size) -> None:
                 archive.writestr(f"{name}.npy", _header(np.dtype(np.int64), ()) + np.int64(value).tobytes())
 
 
-def _header(dtype: np.dtype[np.generic], shape: tuple[int, ...]) -> bytes:
+def _header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
     head = io.BytesIO()
     description = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
     np.lib.format.write_array_header_1_0(head, description)
