@@ -25,6 +25,7 @@ def make(kind: type[S], values: Mapping[str, object], base: S | None = None) -> 
     Raises SettingsError for an unknown key or a value of the wrong type; `kind`'s own
     `__post_init__` raises it for values out of range.
     """
+    # `kind` is a dataclass, which a TypeVar cannot say: hence the three exceptions to the types below.
     known = {field.name for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
     for key in values:
         if key not in known:
