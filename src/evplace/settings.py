@@ -73,7 +73,10 @@ def _as(hint: Any, value: object, key: str) -> object:
     origin = getattr(hint, "__origin__", None)
     if origin is tuple and isinstance(value, list | tuple):
         return tuple(value)
-    if origin is dict and isinstance(value, Mapping):
+    if isinstance(value, Mapping) and dict in (
+        origin,
+        *(getattr(one, "__origin__", None) for one in options),
+    ):
         return dict(value)
     if hint is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)

@@ -74,7 +74,7 @@ def reproduce(
     folder, chosen = Path(out), choice or Choice()
     family = plugs.load("reproduction", name)
     count = workers or os.cpu_count() or 1
-    began = time.monotonic()
+    began, cpu_before = time.monotonic(), _cpu_s()
     with locked(folder / name):
         if city is None:
             generate(folder / "city", workers=count)
@@ -87,6 +87,7 @@ def reproduce(
             "settings": {"city": cities.settings, "seeds": chosen.seeds, "train": chosen.train},
             "versions": versions(),
             "took_s": round(time.monotonic() - began, 1),
+            "cpu_s": round(_cpu_s() - cpu_before, 1),
         }
         with new_file(folder / f"{name}.json", overwrite=True) as partial:
             write_json(partial, document)
@@ -96,7 +97,7 @@ def reproduce(
 def _answer(
     cases: list[Case], total: int, cities: Cities, runs: Runs, workers: int, progress: Progress | None
 ) -> None:
-    """Run all `cases`, those that share a map in one process."""
+    """Run all `cases` in processes; those that share a map stand together."""
     done = total - len(cases)
     if not cases:
         return
@@ -104,23 +105,25 @@ def _answer(
     groups: dict[str, list[Case]] = {}
     for case in cases:
         groups.setdefault(case.map_key(runs.city), []).append(case)
-    # What is trained comes first: the longest jobs last would leave a core idle.
+    # What is trained comes first: the longest work last would leave a core idle. Each process gets its share
+    # at once, for starting one takes seconds.
     ordered = sorted(groups.values(), key=lambda group: group[0].train is None)
     count = min(workers, len(ordered))
+    shares = [[sorted(group, key=_shared) for group in ordered[start::count]] for start in range(count)]
     jobs = [
         {
             "city": str(cities.city), "beside": str(cities.beside), "out": str(runs.out),
             "threads": max(1, (os.cpu_count() or 1) // count),
-            "cases": [case.to_dict() for case in sorted(group, key=_shared)],
+            "groups": [[case.to_dict() for case in group] for group in share],
         }
-        for group in ordered
+        for share in shares
     ]  # fmt: skip
     finished = [done]
 
-    def said(index: int, _: str) -> None:
+    def said(_: int, line: str) -> None:
         finished[0] += 1
         if progress is not None:
-            progress(finished[0], total, f"{ordered[index][0].query} {ordered[index][0].part}")
+            progress(finished[0], total, line)
 
     run_all("evplace.reproduction._worker", jobs, count, said)
 
@@ -128,3 +131,9 @@ def _answer(
 def _shared(case: Case) -> tuple[str, str, str]:
     """Cases of one query and scorer stand together, so that rows are scored once."""
     return case.query, case.scorer, str(case.scorer_settings)
+
+
+def _cpu_s() -> float:
+    """Processor seconds of this process and of its ended children so far."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system

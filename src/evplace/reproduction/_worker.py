@@ -1,10 +1,9 @@
-"""Cases that share a map, in a process of its own: `python -m evplace.reproduction._worker JOB`."""
+"""Many cases in a process of its own: `python -m evplace.reproduction._worker JOB`."""
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
-import os
 import sys
 import time
 from collections.abc import Callable
@@ -33,30 +32,31 @@ RULES: tuple[Rule, ...] = ("places", "view")
 
 
 def work(job: dict[str, Any], say: Callable[[str], None]) -> None:
-    """Answer all cases of `job`, which share a map; says the key of each one that is done."""
-    _one_thread_each(job["threads"])
+    """Answer the cases of all groups of `job`, each of which shares a map; says what was done, one by one."""
+    _limit_threads(job["threads"])
     cities = Cities(Path(job["city"]), Path(job["beside"]))
     runs = Runs(Path(job["out"]), cities.settings)
-    cases = [Case.from_dict(values) for values in job["cases"]]
+    for group in job["groups"]:
+        _answer_group([Case.from_dict(values) for values in group], cities, runs, say)
+
+
+def _answer_group(cases: list[Case], cities: Cities, runs: Runs, say: Callable[[str], None]) -> None:
+    """Learn the map of `cases`, and answer them one query and scorer after the other."""
     day = cities.opened(cases[0].database, cases[0])
     learned = _learned(cases[0], day, runs)
-    for (query, scorer, _), group in itertools.groupby(
-        cases, lambda case: (case.query, case.scorer, str(case.scorer_settings))
-    ):
+    for _, group in itertools.groupby(cases, lambda case: (case.query, case.scorer, case.scorer_settings)):
         same = list(group)
-        place_map = dataclasses.replace(
-            learned, scorer=scorer, settings={**learned.settings, "scorer": same[0].scorer_settings}
-        )
-        traverse = cities.opened(query, same[0])
+        settings = {**learned.settings, "scorer": same[0].scorer_settings}
+        place_map = dataclasses.replace(learned, scorer=same[0].scorer, settings=settings)
+        query = cities.opened(same[0].query, same[0])
         rows: NDArray[np.float32] | None = None
         for case in same:
-            rows = _answer(case, place_map, traverse, rows, runs)
-            say(case.key(runs.city))
+            rows = _answer(case, place_map, query, rows, runs)
+            say(f"{case.query} {case.part} {case.scorer} {case.matcher}")
 
 
-def _one_thread_each(threads: int) -> None:
-    """As many threads as there are cores for this worker: more would only get in each other's way."""
-    os.environ["OMP_NUM_THREADS"] = str(threads)
+def _limit_threads(threads: int) -> None:
+    """As many threads as there are cores for this process: more would only get in each other's way."""
     try:
         import torch
     except ModuleNotFoundError as error:

@@ -72,6 +72,7 @@ def collect(runs: Runs, choice: Choice) -> dict[str, Any]:
                 "method": recipe.method,
                 "query": query,
                 "before": float(np.mean(before)),
+                "before_spread": _deviation(before),
                 "mean": float(np.mean(after)),
                 "spread": _deviation(after),
                 "effect": effect,
@@ -115,7 +116,7 @@ def _changed(recipe: Recipe, query: str, choice: Choice) -> list[Case]:
         scorer_settings=recipe.scorer_settings,
         settings={**given.settings, **recipe.matcher_settings},
     )
-    case = Case.of(DATABASE, query, seen, how, {**choice.train, **recipe.train})
+    case = Case.of(DATABASE, query, seen, how, {**recipe.train, **choice.train})
     return dataclasses.replace(case, origin=recipe.origin).with_seeds(choice.seeds)
 
 
