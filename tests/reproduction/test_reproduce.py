@@ -14,7 +14,7 @@ from evplace.cli import main
 from evplace.errors import InputError, SettingsError
 from evplace.reproduction import Choice, reproduce, table2
 from evplace.reproduction._cases import Case
-from evplace.reproduction._drives import Cities
+from evplace.reproduction._cities import Cities
 from evplace.reproduction._recipes import inputs, methods, recipes
 from evplace.traverse import Traverse
 
@@ -39,7 +39,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def table(city: Path, out: Path) -> dict[str, Any]:
-    return reproduce("table2", out, city, SOME, workers=1)
+    return reproduce("table2", out, city, choice=SOME, workers=1)
 
 
 def test_table_2_has_every_cell_by_both_rules(table: dict[str, Any], out: Path) -> None:
@@ -89,10 +89,10 @@ def test_nothing_is_run_twice_and_other_settings_are(
     assert json.loads(capsys.readouterr().out)["rows"] == table["rows"]
     assert {file: file.stat().st_mtime_ns for file in (out / "runs").iterdir()} == before
     (out / "runs" / sorted(before)[0].name).unlink()
-    again = reproduce("table2", out, city, SOME)
+    again = reproduce("table2", out, city, choice=SOME)
     assert again["rows"] == table["rows"]  # what was lost is made again, and comes out the same
-    case = table2.cases(SOME)[0]
-    longer = table2.cases(Choice(1, {**TRAINING, "steps": 5}, SOME.inputs))[0]
+    case = table2.cases(Cities(city, out), SOME)[0]
+    longer = table2.cases(Cities(city, out), Choice(1, {**TRAINING, "steps": 5}, SOME.inputs))[0]
     settings = Cities(city, out).settings
     assert case.key(settings) != longer.key(settings)
     assert case.key(settings) != case.key({**settings, "seed": 1})
@@ -100,7 +100,7 @@ def test_nothing_is_run_twice_and_other_settings_are(
 
 def test_figure_5_has_a_curve_for_each_method(table: dict[str, Any], city: Path, out: Path) -> None:
     maps = {file: file.stat().st_mtime_ns for file in (out / "maps").iterdir()}
-    figure = reproduce("figure5", out, city, Choice(2, TRAINING, ("events",)), workers=1)
+    figure = reproduce("figure5", out, city, choice=Choice(2, TRAINING, ("events",)), workers=1)
     assert {file: file.stat().st_mtime_ns for file in (out / "maps").iterdir()} == maps
     assert [curve["panel"] for curve in figure["curves"]].count("day-night") == 6
     for curve in figure["curves"]:
@@ -112,7 +112,7 @@ def test_figure_5_has_a_curve_for_each_method(table: dict[str, Any], city: Path,
 
 
 def test_ablations_compare_with_the_same_seeds(city: Path, out: Path) -> None:
-    table = reproduce("ablations", out, city, Choice(2, {**TRAINING, "epochs": 0}), workers=1)
+    table = reproduce("ablations", out, city, choice=Choice(2, {**TRAINING, "epochs": 0}), workers=1)
     rows = table["rows"]
     assert {row["verdict"] for row in rows} <= {"better", "worse", "no effect seen"}
     assert [abs(row["effect"]) for row in rows] == sorted((abs(row["effect"]) for row in rows), reverse=True)
@@ -147,7 +147,7 @@ def test_every_recipe_is_read(family: str) -> None:
 def test_wrong_wishes_are_one_clear_line(
     city: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(SettingsError, match="known are ablations, figure5, table2"):
+    with pytest.raises(SettingsError, match="known are ablations, figure5, real, table2"):
         reproduce("table3", tmp_path, city)
     with pytest.raises(InputError, match="holds no drives: make them with evplace city"):
         reproduce("table2", tmp_path / "out", tmp_path)

@@ -1,9 +1,9 @@
-"""The paper's comparison on the benchmark city: recipes in, a document and a cache of runs out.
+"""The paper's comparison on the benchmark city and on real sets: from recipes to documents.
 
-One file a table or figure; its name is what users ask for. Each holds `cases(choice)` (all that must be run),
-`collect(runs, choice)` (the document, as plain values) and `tables(document)` (the same for people). What was
-run is kept by its settings in the output folder, so that a second call, another table or a killed call runs
-only what is missing.
+One file a table or figure; its name is what users ask for. Each holds NEEDS ("city" or "data"),
+`cases(drives, choice)` (all that must be run), `collect(drives, runs, choice)` (the document, as plain values)
+and `tables(document)` (the same for people). What was run is kept by its settings in the output folder, so
+that a second call, another table or a killed call runs only what is missing.
 """
 
 from __future__ import annotations
@@ -17,15 +17,17 @@ from typing import Any, NamedTuple
 
 from evplace import plugs
 from evplace.city import generate
-from evplace.errors import SettingsError
+from evplace.errors import InputError, SettingsError
 from evplace.evaluation import versions
 from evplace.reproduction._cases import Case
-from evplace.reproduction._drives import Cities
+from evplace.reproduction._cities import Cities
+from evplace.reproduction._real_sets import RealSets
 from evplace.reproduction._recipes import inputs
 from evplace.reproduction._runs import Runs
 from evplace.storage import locked, new_file, write_json
 from evplace.workers import run_all
 
+Drives = Cities | RealSets
 Progress = Callable[[int, int, str], None]
 """Called with (cases done, cases in all, what is being done)."""
 
@@ -61,30 +63,30 @@ def reproduce(
     name: str,
     out: str | Path,
     city: str | Path | None = None,
+    data: str | Path | None = None,
     choice: Choice | None = None,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Make a table or figure and write `out/NAME.json`; returns what it holds.
 
-    `city` is a folder of `evplace city`; without one, the benchmark is made in `out/city`. `workers`
-    processes are used (None: one a core); they do not change the result. Raises SettingsError for an
-    unknown name, InputError where the city lacks a drive, OutputError where another process writes `out`.
+    `city` is a folder of `evplace city`; without one, the benchmark is made in `out/city`. `data` is a folder
+    of real sets, which the table `real` is made of. `workers` processes are used (None: one a core); they do
+    not change the result. Raises SettingsError for an unknown name, InputError where a drive is lacking,
+    OutputError where another process writes `out`.
     """
     folder, chosen = Path(out), choice or Choice()
     family = plugs.load("reproduction", name)
     count = workers or os.cpu_count() or 1
     began, cpu_before = time.monotonic(), _cpu_s()
     with locked(folder / name):
-        if city is None:
-            generate(folder / "city", workers=count)
-        cities = Cities(Path(city) if city is not None else folder / "city", folder)
-        runs = Runs(folder, cities.settings)
-        cases = family.cases(chosen)
-        _answer([case for case in cases if not runs.done(case)], len(cases), cities, runs, count, progress)
-        document: dict[str, Any] = family.collect(runs, chosen)
+        drives = _real_sets(data) if family.NEEDS == "data" else _cities(folder, city, count)
+        runs = Runs(folder, drives.settings)
+        cases = family.cases(drives, chosen)
+        _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, count, progress)
+        document: dict[str, Any] = family.collect(drives, runs, chosen)
         document |= {
-            "settings": {"city": cities.settings, "seeds": chosen.seeds, "train": chosen.train},
+            "settings": {"drives": drives.settings, "seeds": chosen.seeds, "train": chosen.train},
             "versions": versions(),
             "took_s": round(time.monotonic() - began, 1),
             "cpu_s": round(_cpu_s() - cpu_before, 1),
@@ -94,17 +96,33 @@ def reproduce(
     return document
 
 
+def _cities(folder: Path, city: str | Path | None, workers: int) -> Cities:
+    """The given city, or the benchmark, made where it is not there yet."""
+    if city is None:
+        generate(folder / "city", workers=workers)
+    return Cities(Path(city) if city is not None else folder / "city", folder)
+
+
+def _real_sets(data: str | Path | None) -> RealSets:
+    """The sets in a folder of data; InputError where none is there."""
+    if data is None:
+        raise InputError("real sets are not made but read: give the folder that holds them with --data")
+    found = RealSets(Path(data))
+    if not found.settings:
+        raise InputError(f"{data} holds none of the real sets that there are recipes for")
+    return found
+
+
 def _answer(
-    cases: list[Case], total: int, cities: Cities, runs: Runs, workers: int, progress: Progress | None
+    cases: list[Case], total: int, drives: Drives, runs: Runs, workers: int, progress: Progress | None
 ) -> None:
     """Run all `cases` in processes; those that share a map stand together."""
-    done = total - len(cases)
     if not cases:
         return
-    cities.prepare(cases, workers)
+    drives.prepare(cases, workers)
     groups: dict[str, list[Case]] = {}
     for case in cases:
-        groups.setdefault(case.map_key(runs.city), []).append(case)
+        groups.setdefault(case.map_key(runs.source), []).append(case)
     # What is trained comes first: the longest work last would leave a core idle. Each process gets its share
     # at once, for starting one takes seconds.
     ordered = sorted(groups.values(), key=lambda group: group[0].train is None)
@@ -112,13 +130,13 @@ def _answer(
     shares = [[sorted(group, key=_shared) for group in ordered[start::count]] for start in range(count)]
     jobs = [
         {
-            "city": str(cities.city), "beside": str(cities.beside), "out": str(runs.out),
+            "kind": type(drives).__name__, "drives": drives.to_dict(), "out": str(runs.out),
             "threads": max(1, (os.cpu_count() or 1) // count),
             "groups": [[case.to_dict() for case in group] for group in share],
         }
         for share in shares
     ]  # fmt: skip
-    finished = [done]
+    finished = [total - len(cases)]
 
     def said(_: int, line: str) -> None:
         finished[0] += 1

@@ -127,13 +127,13 @@ class Case:
         """As plain values, for JSON."""
         return asdict(self)
 
-    def key(self, city: Values) -> str:
-        """What two runs of the same case have in common: a checksum of its settings and of the city's."""
-        return _checksum({**replace(self, keep="").to_dict(), "city": city})
+    def key(self, source: Values) -> str:
+        """What two runs of the same case have in common: a checksum of its settings and of the drives'."""
+        return _checksum({**replace(self, keep="").to_dict(), "city": source})
 
-    def map_key(self, city: Values) -> str:
+    def map_key(self, source: Values) -> str:
         """The same of its map alone: a network does not depend on the query, nor on who reads it."""
-        of_map = self.to_dict() | {"city": city}
+        of_map = self.to_dict() | {"city": source}
         beside = {"query", "matcher", "matcher_settings", "swept", "keep"}
         if self.train is not None:
             beside |= {"scorer", "scorer_settings"}

@@ -16,8 +16,8 @@ class Runs:
 
     out: Path
     """The folder."""
-    city: dict[str, Any]
-    """How the benchmark's drives were made: other drives, other runs."""
+    source: dict[str, Any]
+    """How the drives were made: other drives, other runs."""
 
     def done(self, case: Case) -> bool:
         """Whether a case has been answered, and its result is there where it is to be kept."""
@@ -34,11 +34,11 @@ class Runs:
 
     def map_file(self, case: Case) -> Path:
         """Where the map of a case is kept."""
-        return self.out / "maps" / f"{case.map_key(self.city)}.evp"
+        return self.out / "maps" / f"{case.map_key(self.source)}.evp"
 
     def result_folder(self, case: Case) -> Path:
         """Where the whole result of a case is kept."""
         return self.out / "results" / case.keep
 
     def _file(self, case: Case) -> Path:
-        return self.out / "runs" / f"{case.key(self.city)}.json"
+        return self.out / "runs" / f"{case.key(self.source)}.json"

@@ -17,41 +17,41 @@ from evplace.errors import MissingExtraError
 from evplace.evaluation import Result, measure
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
-from evplace.places import PlaceGrid
+from evplace.reproduction import Drives
 from evplace.reproduction._cases import Case
-from evplace.reproduction._drives import Cities
+from evplace.reproduction._cities import Cities
+from evplace.reproduction._real_sets import RealSets
 from evplace.reproduction._runs import Runs
 from evplace.settings import make
 from evplace.sweeps import SWEPT, sweep
 from evplace.training import TrainSettings, train
 from evplace.traverse import Traverse
-from evplace.trial import Rule, truth_of
 from evplace.workers import serve
 
-RULES: tuple[Rule, ...] = ("places", "view")
+KINDS: dict[str, type[Cities] | type[RealSets]] = {kind.__name__: kind for kind in (Cities, RealSets)}
 
 
 def work(job: dict[str, Any], say: Callable[[str], None]) -> None:
     """Answer the cases of all groups of `job`, each of which shares a map; says what was done, one by one."""
     _limit_threads(job["threads"])
-    cities = Cities(Path(job["city"]), Path(job["beside"]))
-    runs = Runs(Path(job["out"]), cities.settings)
+    drives = KINDS[job["kind"]].from_dict(job["drives"])
+    runs = Runs(Path(job["out"]), drives.settings)
     for group in job["groups"]:
-        _answer_group([Case.from_dict(values) for values in group], cities, runs, say)
+        _answer_group([Case.from_dict(values) for values in group], drives, runs, say)
 
 
-def _answer_group(cases: list[Case], cities: Cities, runs: Runs, say: Callable[[str], None]) -> None:
+def _answer_group(cases: list[Case], drives: Drives, runs: Runs, say: Callable[[str], None]) -> None:
     """Learn the map of `cases`, and answer them one query and scorer after the other."""
-    day = cities.opened(cases[0].database, cases[0])
-    learned = _learned(cases[0], day, runs)
+    day = drives.opened(cases[0].database, cases[0])
+    learned = _learned(cases[0], day, drives, runs)
     for _, group in itertools.groupby(cases, lambda case: (case.query, case.scorer, case.scorer_settings)):
         same = list(group)
         settings = {**learned.settings, "scorer": same[0].scorer_settings}
         place_map = dataclasses.replace(learned, scorer=same[0].scorer, settings=settings)
-        query = cities.opened(same[0].query, same[0])
+        query = drives.opened(same[0].query, same[0])
         rows: NDArray[np.float32] | None = None
         for case in same:
-            rows = _answer(case, place_map, query, rows, runs)
+            rows = _answer(case, place_map, query, rows, drives, runs)
             say(f"{case.query} {case.part} {case.scorer} {case.matcher}")
 
 
@@ -64,10 +64,9 @@ def _limit_threads(threads: int) -> None:
     torch.set_num_threads(threads)
 
 
-def _learned(case: Case, day: Traverse, runs: Runs) -> PlaceMap:
+def _learned(case: Case, day: Traverse, drives: Drives, runs: Runs) -> PlaceMap:
     """The map of a case: read where it is there, else learned, and kept where that took long."""
-    assert day.track is not None  # the city knows where it is
-    places = PlaceGrid.from_track(day.track, origin=case.origin)
+    places = drives.places(day, case)
     if case.train is None:
         return train(day, places, case.scorer, scorer_settings=case.scorer_settings)
     file = runs.map_file(case)
@@ -81,21 +80,25 @@ def _learned(case: Case, day: Traverse, runs: Runs) -> PlaceMap:
 
 
 def _answer(
-    case: Case, place_map: PlaceMap, query: Traverse, rows: NDArray[np.float32] | None, runs: Runs
+    case: Case,
+    place_map: PlaceMap,
+    query: Traverse,
+    rows: NDArray[np.float32] | None,
+    drives: Drives,
+    runs: Runs,
 ) -> NDArray[np.float32]:
     """Answer one case and keep what came out; returns the score rows, for the next one."""
     began = time.process_time()
     where = Localizer(place_map, case.matcher, **case.matcher_settings)
     path, rows = where.path(query, rows)
     found: dict[str, Any] = {}
-    for rule in RULES:
-        truth = truth_of(place_map, query, rule)
+    for rule, truth in drives.truths(place_map, query, case).items():
         settings = {"case": case.to_dict(), "map": place_map.settings, "matcher": where.settings}
         result = measure(path, truth, rows, place_map.items.position, query.t_us, settings)
         found[rule] = {"figures": result.figures}
         if case.swept:
             found[rule]["curve"] = _curve(case, rows, query, result, truth.accepts).tolist()
-        if case.keep and rule == "places":
+        if case.keep and not found.keys() - {rule}:
             result.save(runs.result_folder(case), overwrite=True)
     runs.keep(case, {"rules": found, "cpu_s": round(time.process_time() - began, 2)})
     return rows

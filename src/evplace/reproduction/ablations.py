@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from evplace.reproduction import Choice, Table
+from evplace.reproduction import Choice, Drives, Table
 from evplace.reproduction._cases import Case, Values
+from evplace.reproduction._figures import deviation
 from evplace.reproduction._recipes import inputs, methods, recipes
 from evplace.reproduction._runs import Runs
 
 TITLE = "Ablations: one change at a time against the paper as printed"
+NEEDS = "city"
 FORMAT = "evplace-ablations-1"
 DATABASE, INPUT = "day-1", "events"
 NO_EFFECT = "no effect seen"
@@ -52,18 +54,18 @@ class Recipe:
     """Corner of the grid of places, metres."""
 
 
-def cases(choice: Choice) -> list[Case]:
+def cases(_: Drives, choice: Choice) -> list[Case]:
     """Every change, and what it is compared with."""
     return [case for _, _, pair in _pairs(choice) for group in pair for case in group]
 
 
-def collect(runs: Runs, choice: Choice) -> dict[str, Any]:
+def collect(_: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
     """One row a change and query, the largest effect first."""
     rows: list[dict[str, Any]] = []
     for recipe, query, (plain, changed) in _pairs(choice):
         before, after = (_accuracies(runs, group) for group in (plain, changed))
         effect = float(np.mean(after - before))
-        spread = max(_deviation(before), _deviation(after))
+        spread = max(deviation(before.tolist()) or 0.0, deviation(after.tolist()) or 0.0)
         verdict = NO_EFFECT if not abs(effect) > spread else "better" if effect > 0 else "worse"
         rows.append(
             {
@@ -72,11 +74,11 @@ def collect(runs: Runs, choice: Choice) -> dict[str, Any]:
                 "method": recipe.method,
                 "query": query,
                 "before": float(np.mean(before)),
-                "before_spread": _deviation(before),
+                "before_spread": deviation(before.tolist()) or 0.0,
                 "mean": float(np.mean(after)),
-                "spread": _deviation(after),
+                "spread": deviation(after.tolist()) or 0.0,
                 "effect": effect,
-                "effect_spread": _deviation(after - before),
+                "effect_spread": deviation((after - before).tolist()) or 0.0,
                 "verdict": verdict,
                 "seeds": len(after),
             }
@@ -123,8 +125,3 @@ def _changed(recipe: Recipe, query: str, choice: Choice) -> list[Case]:
 def _accuracies(runs: Runs, group: list[Case]) -> np.ndarray[Any, np.dtype[np.float64]]:
     """(seeds,) in %."""
     return np.array([100 * runs.found(case)["rules"]["places"]["figures"]["accuracy"] for case in group])
-
-
-def _deviation(values: np.ndarray[Any, np.dtype[np.float64]]) -> float:
-    """Standard deviation over the seeds; 0 for one."""
-    return float(np.std(values, ddof=1)) if len(values) > 1 else 0.0

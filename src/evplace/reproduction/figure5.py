@@ -15,13 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.reproduction import Choice, Table
+from evplace.reproduction import Choice, Drives, Table
 from evplace.reproduction._cases import Case
+from evplace.reproduction._figures import deviation
 from evplace.reproduction._recipes import inputs, methods, recipes
 from evplace.reproduction._runs import Runs
 from evplace.sweeps import SWEPT
 
 TITLE = "Figure 5: precision against recall"
+NEEDS = "city"
 FORMAT = "evplace-curves-1"
 
 
@@ -45,12 +47,12 @@ class Recipe:
     """Curves of the paper: method, and points (recall, precision)."""
 
 
-def cases(choice: Choice) -> list[Case]:
+def cases(_: Drives, choice: Choice) -> list[Case]:
     """All curves, one a seed."""
     return [case for _, _, _, group in _curves(choice) for case in group]
 
 
-def collect(runs: Runs, choice: Choice) -> dict[str, Any]:
+def collect(_: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
     """The curves of the first seed, with the average precision over all."""
     curves = []
     for recipe, name, method, group in _curves(choice):
@@ -68,7 +70,7 @@ def collect(runs: Runs, choice: Choice) -> dict[str, Any]:
                     [float(f"{value:.5g}") for value in point] for point in _corners(points[0]).tolist()
                 ],
                 "average_precision": float(np.mean(average)),
-                "spread": float(np.std(average, ddof=1)) if len(average) > 1 else None,
+                "spread": deviation(average),
                 "seeds": len(average),
             }
         )

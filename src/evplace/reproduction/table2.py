@@ -10,14 +10,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
-from evplace.reproduction import Choice, Table
+from evplace.reproduction import Choice, Drives, Table
 from evplace.reproduction._cases import Case
+from evplace.reproduction._figures import row_of, shown
 from evplace.reproduction._recipes import inputs, methods, recipes
 from evplace.reproduction._runs import Runs
 
 TITLE = "Table 2: accuracy in %, the map is the day's drive on path 1"
+NEEDS = "city"
 FORMAT = "evplace-table-1"
 KEPT_INPUTS = ("events", "events, from 8 bit", "colour")
 KEPT_METHODS = (
@@ -42,37 +42,21 @@ class Recipe:
     """Method -> events and colour -> the paper's accuracy in %."""
 
 
-def cases(choice: Choice) -> list[Case]:
+def cases(_: Drives, choice: Choice) -> list[Case]:
     """All cells of the table."""
     return [case for _, _, _, group in _cells(choice) for case in group]
 
 
-def collect(runs: Runs, choice: Choice) -> dict[str, Any]:
+def collect(_: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
     """The table as plain values: a row for each query, input, method and rule."""
     rows = []
     for recipe, name, method, group in _cells(choice):
-        outcomes = [runs.found(case)["rules"] for case in group]
+        outcomes = [runs.found(case) for case in group]
         seen = inputs()[name]
+        about = {"database": recipe.database, "query": recipe.query, "input": name, "sensor": seen.sensor}
         for rule in RULES:
-            figures = [outcome[rule]["figures"] for outcome in outcomes]
             paper = recipe.paper.get(method, {}).get(seen.paper) if rule == "places" else None
-            rows.append(
-                {
-                    "database": recipe.database,
-                    "query": recipe.query,
-                    "input": name,
-                    "sensor": seen.sensor,
-                    "matcher": method,
-                    "rule": rule,
-                    **_spread([figure["accuracy"] for figure in figures]),
-                    "seen": _mean([figure["accuracy_seen"] for figure in figures]),
-                    "rejected": _mean([figure["rejection_rate"] for figure in figures]),
-                    "chance": _mean([figure["chance"] for figure in figures]),
-                    "trained": group[0].train is not None,
-                    "n": figures[0]["judged"],
-                    "paper": paper,
-                }
-            )
+            rows.append({**about, "matcher": method, **row_of(outcomes, rule), "paper": paper})
     return {"format": FORMAT, "title": TITLE, "rows": rows}
 
 
@@ -114,34 +98,14 @@ def _table(title: str, rows: list[dict[str, Any]], figure: str) -> Table:
         for matcher in dict.fromkeys(row["matcher"] for row in rows):
             line = [cells[query, matcher, name] for name in names]
             paper = _paper(line) if figure == "mean" else ""
-            lines.append([query, matcher, *[_shown(cell, figure) for cell in line], paper])
+            lines.append([query, matcher, *[shown(cell, figure) for cell in line], paper])
     columns = ["query", "method", *names, "paper"]
     if not any(line[-1] for line in lines):  # only the first table has the paper's numbers
         columns, lines = columns[:-1], [line[:-1] for line in lines]
     return Table(title, columns, lines)
 
 
-def _shown(cell: dict[str, Any], figure: str) -> str:
-    value = cell[figure]
-    if value is None:
-        return "-"
-    spread = f" ± {cell['spread']:.1f}" if figure == "mean" and cell["spread"] is not None else ""
-    return f"{value:.1f}{spread}"
-
-
 def _paper(line: list[dict[str, Any]]) -> str:
     """The paper's numbers for events and for colour, beside our inputs of that name."""
     told = {inputs()[cell["input"]].paper: cell["paper"] for cell in line if cell["paper"] is not None}
     return ", ".join(f"{told[kind]:.1f}" for kind in ("events", "colour") if kind in told)
-
-
-def _spread(shares: list[float]) -> dict[str, Any]:
-    """Mean in %, standard deviation over the seeds (None for one), and the values."""
-    values = [round(100 * share, 4) for share in shares]
-    spread = float(np.std(values, ddof=1)) if len(values) > 1 else None
-    return {"mean": float(np.mean(values)), "spread": spread, "seeds": len(values), "values": values}
-
-
-def _mean(shares: list[float | None]) -> float | None:
-    known = [100 * share for share in shares if share is not None]
-    return float(np.mean(known)) if known else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -14,14 +14,19 @@ from evplace.city.generation import SETTINGS_FILE
 from evplace.errors import InputError
 from evplace.events import Events
 from evplace.images import Imager, ImageSettings
+from evplace.placemap import PlaceMap
+from evplace.places import PlaceGrid
 from evplace.readers import open_recording
 from evplace.reproduction._cases import Case
 from evplace.settings import make, to_dict
 from evplace.storage import new_folder, read_json
 from evplace.tones import toned
 from evplace.traverse import Traverse, TraverseWriter
+from evplace.trial import Rule, truth_of
+from evplace.truth import Truth
 from evplace.windows import WindowSettings
 
+RULES: tuple[Rule, ...] = ("places", "view")
 EXPOSED_GAIN = 64.0
 """Largest gain of the camera that exposes itself: enough for the city's nights."""
 
@@ -34,6 +39,15 @@ class Cities:
     """Drives of every sensor, as `evplace city` makes them."""
     beside: Path
     """Folder for the drives of the self-exposing camera, for kept events, and for images made from them."""
+
+    def to_dict(self) -> dict[str, str]:
+        """As plain values, for a process of its own."""
+        return {"city": str(self.city), "beside": str(self.beside)}
+
+    @classmethod
+    def from_dict(cls, values: dict[str, str]) -> Self:
+        """What `to_dict` gave."""
+        return cls(Path(values["city"]), Path(values["beside"]))
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -53,6 +67,15 @@ class Cities:
         if case.tone == "plain":
             return found
         return dataclasses.replace(found, images=toned(np.asarray(found.images), case.tone))
+
+    def places(self, day: Traverse, case: Case) -> PlaceGrid:
+        """The grid of the map's drive."""
+        assert day.track is not None  # the city knows where it is
+        return PlaceGrid.from_track(day.track, origin=case.origin)
+
+    def truths(self, place_map: PlaceMap, query: Traverse, _: Case) -> dict[str, Truth]:
+        """Rule -> what is right: by places, the paper's, and by view."""
+        return {rule: truth_of(place_map, query, rule) for rule in RULES}
 
     def prepare(self, cases: list[Case], workers: int) -> None:
         """Make the drives that the benchmark does not have and some case needs."""
