@@ -11,7 +11,7 @@ SRC = Path(__file__).parents[1] / "src" / "evplace"
 
 ROOMS = (
     "errors plugs storage settings events readers writers cleaning windows resampling representations images "
-    "stream frames tracks places truth traverse sheets capture datasets simulators city placemap network "
+    "stream frames tracks places truth traverse sheets simulators datasets capture city placemap network "
     "network_onnx checkpoint training distances seqslam_images scorers matchers sweeps localizer evaluation "
     "trial charts cli"
 ).split()
