@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace import settings as settings_room
+from evplace.cleaning import CleaningSettings, MaskSource, pixel_mask
 from evplace.errors import DamagedRecordingError, TrackError, TraverseError
 from evplace.events import Events, Size
 from evplace.frames import Frames, is_frames, open_frames
 from evplace.images import ImageSettings, frame_image
 from evplace.readers import Recording, open_recording
-from evplace.stream import event_images
+from evplace.spacing import Spacer, SpacingSettings
+from evplace.stream import EventImages, images_of
 from evplace.tracks import Track, open_track
 from evplace.traverse import Traverse, TraverseWriter
 from evplace.windows import WindowSettings
@@ -29,26 +31,32 @@ def open_traverse(
     images: ImageSettings | None = None,
     size: Size | None = None,
     time_unit: str | None = None,
+    cleaning: CleaningSettings | None = None,
+    spacing: SpacingSettings | None = None,
+    mask: MaskSource | None = None,
 ) -> Traverse:
     """A traverse folder, an event recording or a folder of images, whichever `path` is.
 
     Recordings and images are turned into images in memory; for long ones, write a traverse folder with
     `evplace images` first. `track` is a GPS log, or a Track; `size` and `time_unit` are
-    for recordings that do not say (see `open_recording`). InputError where something cannot be read.
+    for recordings that do not say (see `open_recording`). `mask` names pixels of the recording to leave out
+    (see `evplace.cleaning.read_mask`), besides what `cleaning` says. InputError where something cannot be
+    read, or where a traverse folder was cleaned or spaced in another way than is asked for.
     """
     if (Path(path) / "traverse.json").exists():
         found = Traverse.load(path)
+        _check_made_so(Path(path), found, cleaning, spacing, mask)
         aligned = _aligned(_opened(track), found.t_us)
         return found if aligned is None else dataclasses.replace(found, track=aligned)
     with tempfile.TemporaryDirectory(prefix="evplace-") as folder:
         writer = TraverseWriter(Path(folder), {})
         try:
-            record(path, writer, track, windows, images, size, time_unit)
+            record(path, writer, track, windows, images, size, time_unit, cleaning, spacing, mask)
             writer.close()
         finally:
             writer.discard()
         found = Traverse.load(folder)
-        return Traverse(np.array(found.images), found.t_us, found.counts, found.track, found.info)
+        return dataclasses.replace(found, images=np.array(found.images))
 
 
 def record(
@@ -59,13 +67,18 @@ def record(
     images: ImageSettings | None = None,
     size: Size | None = None,
     time_unit: str | None = None,
+    cleaning: CleaningSettings | None = None,
+    spacing: SpacingSettings | None = None,
+    mask: MaskSource | None = None,
 ) -> str | None:
     """Write the images of an event recording or of a folder of images; returns what broke off, if any."""
     positions = _opened(track)
     if is_frames(Path(path)):
-        record_frames(open_frames(path), path, writer, images, positions)
+        check_uncleaned(path, cleaning, mask)
+        record_frames(open_frames(path), path, writer, images, positions, spacing)
         return None
-    return record_events(open_recording(path, size, time_unit=time_unit), writer, windows, images, positions)
+    recording = open_recording(path, size, time_unit=time_unit)
+    return record_events(recording, writer, windows, images, positions, cleaning, spacing, mask)
 
 
 def record_events(
@@ -74,12 +87,19 @@ def record_events(
     windows: WindowSettings | None = None,
     images: ImageSettings | None = None,
     track: Track | None = None,
+    cleaning: CleaningSettings | None = None,
+    spacing: SpacingSettings | None = None,
+    mask: MaskSource | None = None,
 ) -> str | None:
     """Write a recording's event images; returns what broke off, where the recording is damaged."""
     windows, images = windows or WindowSettings(), images or ImageSettings()
+    cleaning, spacer = cleaning or CleaningSettings(), Spacer(spacing, track)
+    writer.mask = pixel_mask(recording.packets(), recording.size, cleaning, mask)
+    stream = EventImages(recording.size, windows, images, cleaning, writer.mask)
     packets = _GoodPart(recording)
-    for image, window in event_images(packets, recording.size, windows, images):
-        writer.add(image, window.t_us, window.events)
+    for image, window in images_of(packets, stream):
+        if spacer.keeps(window.t_us, window.events):
+            writer.add(image, window.t_us, window.events)
     fault = packets.fault
     writer.track = _aligned(track, np.array(writer.t_us, np.int64))
     writer.info |= {
@@ -88,7 +108,11 @@ def record_events(
         "sensor": list(recording.size),
         "windows": settings_room.to_dict(windows),
         "images": settings_room.to_dict(images),
+        "cleaning": settings_room.to_dict(cleaning),
+        "spacing": settings_room.to_dict(spacer.settings),
         "dropped": recording.dropped,
+        "cleaned": stream.cleaned,
+        "left_out": spacer.left_out,
         "fault": fault,
     }
     return fault
@@ -100,22 +124,54 @@ def record_frames(
     writer: TraverseWriter,
     images: ImageSettings | None = None,
     track: Track | None = None,
+    spacing: SpacingSettings | None = None,
 ) -> None:
     """Write camera images, cropped and resized as `images` says."""
-    images = images or ImageSettings()
+    images, spacer = images or ImageSettings(), Spacer(spacing, track)
     shape = None
     for file, frame, t_us in zip(frames.files, frames, frames.t_us, strict=True):
         shape = shape or frame.shape
         if frame.shape != shape:
             raise TraverseError(f"{file} is {frame.shape}, the images before it are {shape}: make them alike")
-        writer.add(frame_image(frame, images), int(t_us))
-    writer.track = _aligned(track, frames.t_us)
+        if spacer.keeps(int(t_us), -1):
+            writer.add(frame_image(frame, images), int(t_us))
+    writer.track = _aligned(track, np.array(writer.t_us, np.int64))
     writer.info |= {
         "source": str(source),
         "input": "frames",
         "timed": frames.timed,
         "images": settings_room.to_dict(images),
+        "spacing": settings_room.to_dict(spacer.settings),
+        "left_out": spacer.left_out,
     }
+
+
+def _check_made_so(
+    path: Path,
+    found: Traverse,
+    cleaning: CleaningSettings | None,
+    spacing: SpacingSettings | None,
+    mask: MaskSource | None,
+) -> None:
+    """TraverseError where images that are made already were to be cleaned or spaced in another way."""
+    asked = {"cleaning": cleaning or CleaningSettings(), "spacing": spacing or SpacingSettings()}
+    for name, settings in asked.items():
+        made = settings_room.make(type(settings), found.info.get(name) or {})
+        if settings not in (made, type(settings)()):
+            raise TraverseError(
+                f"the images in {path} were made with {name} {settings_room.to_dict(made)}, not "
+                f"{settings_room.to_dict(settings)}: make them again from the recording with `evplace images`"
+            )
+    if mask is not None:
+        raise TraverseError(
+            f"the images in {path} are made already: give the mask to `evplace images` with the recording"
+        )
+
+
+def check_uncleaned(path: str | Path, cleaning: CleaningSettings | None, mask: MaskSource | None) -> None:
+    """TraverseError where camera images were to be cleaned."""
+    if mask is not None or cleaning not in (None, CleaningSettings()):
+        raise TraverseError(f"{path} holds camera images, which have no events to clean: leave that out")
 
 
 def _opened(track: str | Path | Track | None) -> Track | None:

@@ -4,6 +4,9 @@ Examples:
   evplace images night.aedat4 -o night
   evplace images night.aedat4 -o night --track night.nmea       with positions
   evplace images night.aedat4 -o night --dt 1/60 --sheet night.png
+  evplace images night.aedat4 -o night --mask-hot --flicker-hz 100
+  evplace images night.aedat4 -o night --mask night_hot_pixels.txt
+  evplace images day.aedat4 -o day --track day.nmea --every-m 2      an image every two metres
   evplace images frames/ -o day --crop-bottom 0 --width 80 --height 80
 """
 
@@ -15,11 +18,13 @@ from typing import Annotated, Literal
 
 import tyro
 
-from evplace.capture import record, record_frames
+from evplace.capture import check_uncleaned, record, record_frames
+from evplace.cleaning import CleaningSettings
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
 from evplace.frames import is_frames, open_frames
 from evplace.images import ImageSettings
 from evplace.sheets import contact_sheet
+from evplace.spacing import SpacingSettings
 from evplace.tracks import open_track
 from evplace.traverse import Traverse, TraverseWriter, new_traverse
 from evplace.windows import WindowSettings
@@ -47,8 +52,12 @@ class Args:
     """Also write a .png that shows some of the images."""
     windows: Annotated[WindowSettings, tyro.conf.arg(name="")] = field(default_factory=WindowSettings)
     images: Annotated[ImageSettings, tyro.conf.arg(name="")] = field(default_factory=ImageSettings)
+    cleaning: Annotated[CleaningSettings, tyro.conf.arg(name="")] = field(default_factory=CleaningSettings)
+    spacing: Annotated[SpacingSettings, tyro.conf.arg(name="")] = field(default_factory=SpacingSettings)
+    mask: Path | None = None
+    """Pixels to leave out: a text file of x,y lines, or a .npy file (a mask.npy of a traverse will do)."""
     settings: Path | None = None
-    """A TOML file with any of these settings; windows and images are its tables."""
+    """A TOML file with any of these settings; windows, images, cleaning and spacing are its tables."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -68,7 +77,10 @@ def run(args: Args) -> int:
         "shape": list(traverse.images.shape[1:]),
         "empty": int((traverse.counts == 0).sum()),
         "with_position": placed,
+        "left_out": traverse.info.get("left_out", {}),
         "dropped": traverse.info.get("dropped", {}),
+        "masked_pixels": int(traverse.mask.sum()) if traverse.mask is not None else 0,
+        "cleaned": traverse.info.get("cleaned", {}),
         "fault": fault,
     }
     if args.json:
@@ -83,7 +95,12 @@ def run(args: Args) -> int:
 def _record(args: Args, writer: TraverseWriter) -> str | None:
     """Write the images; returns what broke off, if anything."""
     if not is_frames(args.source):
-        return record(args.source, writer, args.track, args.windows, args.images, args.size, args.time_unit)
+        return record(
+            args.source, writer, args.track, args.windows, args.images, args.size, args.time_unit,
+            args.cleaning, args.spacing, args.mask,
+        )  # fmt: skip
+    check_uncleaned(args.source, args.cleaning, args.mask)
     track = open_track(args.track) if args.track is not None else None
-    record_frames(open_frames(args.source, args.list, args.fps), args.source, writer, args.images, track)
+    frames = open_frames(args.source, args.list, args.fps)
+    record_frames(frames, args.source, writer, args.images, track, args.spacing)
     return None

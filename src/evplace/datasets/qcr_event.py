@@ -13,8 +13,8 @@ github.com/EventLAB-Team/Event-LAB), the files themselves were not looked at:
 
 The authors noted when the robot passed each of eleven marks. The track is made of them: its one coordinate
 is the way in per cent of the drive normal1, so a "metre" of it is one per cent of the way (the authors'
-tolerance is 2). Between two marks the robot is taken to be steady; before the first and after the last nothing
-is known.
+tolerance is 2). Between two marks the robot is taken to be steady; before the first and after the last
+nothing is known.
 """
 
 from __future__ import annotations

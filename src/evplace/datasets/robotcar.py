@@ -62,8 +62,7 @@ def demosaiced(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _places(folder: Path) -> dict[str, Path]:
     """Name of a drive -> its folder."""
-    found = {place.name: place for place in _candidates(folder) if (place / "stereo" / "centre").is_dir()}
-    return found
+    return {place.name: place for place in _candidates(folder) if (place / "stereo" / "centre").is_dir()}
 
 
 def _candidates(folder: Path) -> Iterator[Path]:
@@ -98,8 +97,8 @@ def _check_complete(listing: Path, there: set[int]) -> None:
     lost = sorted(t for t, chunk in chunks.items() if chunk in begun and t not in there)
     if lost:
         raise TraverseError(
-            f"{listing} lists {len(lost)} images that are missing, first {lost[0]}.png of chunk {chunks[lost[0]]}: "
-            "unpack that chunk again"
+            f"{listing} lists {len(lost)} images that are missing, first {lost[0]}.png: "
+            f"unpack chunk {chunks[lost[0]]} again"
         )
 
 

@@ -1,7 +1,7 @@
-"""Folders of images with their UTM positions in the names, as the benches of frame-based place recognition read.
+"""Folders of images with their UTM positions in the names, as benches of frame-based recognition read them.
 
-Citation: G. Berton, C. Masone and B. Caputo, "Rethinking Visual Geo-localization for Large-Scale Applications",
-CVPR 2022. Licence: each set's own. Address: https://github.com/gmberton/VPR-datasets-downloader.
+Citation: G. Berton, C. Masone and B. Caputo, "Rethinking Visual Geo-localization for Large-Scale
+Applications", CVPR 2022. Licence: each set's own. Address: https://github.com/gmberton/VPR-datasets-downloader.
 
 Layout, from that repository's README and code:
 
@@ -9,9 +9,10 @@ Layout, from that repository's README and code:
     queries/@...                                                                what is to be found in it
 
 The fields are easting, northing, zone number, zone letter, latitude, longitude, then panorama, tile, heading,
-pitch, roll, height, timestamp, note, and the suffix. Only the first two are required: where no name has a zone
-the positions lie on a plane of their own, which can be compared within the set only. `write_images` notes the
-time as tN us; where all names have such a note it gives order and times, else the names do, at one a second.
+pitch, roll, height, timestamp, note, and the suffix. Only the first two are required: where no name has a
+zone the positions lie on a plane of their own, which can be compared within the set only. `write_images` puts
+the time into the note, as t1500us; where all names have such a note it gives order and times, else the names
+give the order, at one image a second.
 """
 
 from __future__ import annotations
@@ -93,9 +94,8 @@ def write_images(traverse: Traverse, folder: str | Path, overwrite: bool = False
     with new_folder(folder, overwrite) as made:
         for n in np.flatnonzero(track.known):
             image = Image.fromarray(np.ascontiguousarray(traverse.images[n]))
-            image.save(
-                made / _image_name(track, int(n), int(traverse.t_us[n])), quality=_QUALITY, subsampling=0
-            )
+            name = _image_name(track, int(n), int(traverse.t_us[n]))
+            image.save(made / name, quality=_QUALITY, subsampling=0)
     return int(track.known.sum())
 
 

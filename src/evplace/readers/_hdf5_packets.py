@@ -1,10 +1,10 @@
-"""Packets of a DAVIS camera in HDF5, as DDD20 holds them: dvs/data has a row a packet, three strings of bytes.
+"""Packets of a DAVIS camera in HDF5, as DDD20 holds them: dvs/data has three strings of bytes a packet.
 
 The strings are the computer's time, the packet's header and its events, in the layout of cAER
-(github.com/SensorsINI/ddd20-utils, interfaces/caer.py). Polarity events are two 32-bit words: x in the upper 15
-bits, y in the next 15, then polarity and a bit that says whether the event is valid; and the camera's time in
-microseconds. That clock is reset now and then: events are put on the computer's clock (microseconds since 1970,
-dvs/timestamp), at the first packet and wherever the camera's time falls back or leaves it by over a second.
+(github.com/SensorsINI/ddd20-utils, interfaces/caer.py). Polarity events are two 32-bit words: x in the upper
+15 bits, y in the next 15, then polarity and a bit that says whether the event is valid; and the camera's time
+in microseconds. That clock is reset now and then: events are put on the computer's clock (microseconds since
+1970, dvs/timestamp), at the first packet and wherever the camera's time falls back by over a second.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _HEADER = struct.Struct("<hhiiiiii")
 """Type, source, bytes an event, offset of the time, overflow of the time, capacity, number, valid ones."""
 _POLARITY = 1
 _ROWS = 128
-_STRAY_US = 1_000_000
+_FALL_US = 1_000_000
 
 
 def is_packets(file: h5py.File) -> bool:
@@ -51,11 +51,7 @@ def _blocks(path: Path) -> Iterator[Block]:
                 continue
             t_us = events[:, 1].astype(np.int64) + (_HEADER.unpack(header)[4] << 31)
             first, last = int(t_us[0]), int(t_us[-1])
-            if (
-                ahead_us is None
-                or first < last_us - _STRAY_US
-                or abs(last + ahead_us - received_us) > _STRAY_US
-            ):
+            if ahead_us is None or first < last_us - _FALL_US:
                 ahead_us = received_us - last
             last_us = last
             yield _block(events[:, 0], t_us + ahead_us)
@@ -81,8 +77,8 @@ def _polarity_events(header: bytes, data: NDArray[np.uint8]) -> NDArray[np.uint3
         return np.empty((0, 2), np.uint32)
     if width != 8:
         raise ValueError(f"a polarity event of {width} bytes: 8 are known")
-    words = np.frombuffer(data.tobytes(), "<u4").reshape(-1, 2)
-    return words[words[:, 0] & 1 == 1]
+    words: NDArray[np.uint32] = np.frombuffer(data.tobytes(), "<u4").reshape(-1, 2)
+    return words[(words[:, 0] & 1).astype(np.bool_)]
 
 
 def _block(words: NDArray[Any], t_us: NDArray[np.int64]) -> Block:
