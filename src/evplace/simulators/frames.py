@@ -36,6 +36,10 @@ class Film:
         """Whether the times are the camera's, not made up from a rate."""
         return self.frames is None or self.frames.timed
 
+    def name(self, n: int) -> str:
+        """What image `n` is called in errors."""
+        return f"image {n} of {self.path}" if self.frames is None else str(self.frames.files[n])
+
     def __iter__(self) -> Iterator[tuple[int, Grey]]:
         """Each image in grey: microseconds, uint8 (H, W). InputError where one cannot be decoded."""
         if self.frames is None:
