@@ -13,7 +13,7 @@ Layout, of the archives as they unpack (the documentation above; github.com/ori-
 There are no events: they are simulated from the images, as in the paper, which cuts them at 1/16 s. Each 2x2
 block of the Bayer pattern becomes one pixel, so images are 640 x 480 and nothing is interpolated. Chunks are
 downloaded one by one: a chunk may be missing, an image of a chunk that is there may not. The positions are
-ins.csv's where that is there, else gps.csv's.
+ins.csv's where that is there, whatever its ins_status says, else gps.csv's.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def _read(file: Path) -> NDArray[np.uint8]:
 
 
 def _track(place: Path) -> Track:
-    for name in ("ins.csv", "gps.csv"):
+    for name, preset in (("ins.csv", "robotcar-ins"), ("gps.csv", "robotcar")):
         if (place / "gps" / name).exists():
-            return open_track(place / "gps" / name)
+            return open_track(place / "gps" / name, preset)
     raise DatasetError(f"the positions are missing: {place / 'gps'} holds neither ins.csv nor gps.csv")

@@ -138,18 +138,10 @@ def _in_order(places: list[_Place]) -> list[_Place]:
 def _track(places: list[_Place], t_us: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> Track:
     import utm
 
-    zones = {(place.zone, place.letter in _NORTH) for place in places}
-    if len(zones) > 1:
-        first = places[0]
-        other = next(place for place in places if (place.zone, place.letter in _NORTH) not in [*zones][:1])
-        raise TrackError(
-            f"{first.file.parent} mixes UTM zones: {_named(first)} in {first.file.name}, {_named(other)} in "
-            f"{other.file.name}: give all positions in one zone"
-        )
+    zone, northern = _zone(places)
     easting = np.array([place.easting for place in places])
     northing = np.array([place.northing for place in places])
     nowhere = np.full(len(places), np.nan)
-    zone, northern = zones.pop()
     if not zone:
         return Track(t_us, nowhere, nowhere, easting, northing, nowhere, 0, True)
     try:
@@ -157,6 +149,18 @@ def _track(places: list[_Place], t_us: np.ndarray[tuple[int, ...], np.dtype[np.i
     except utm.OutOfRangeError as error:
         raise TrackError(f"{places[0].file.parent}: a position lies outside its UTM zone: {error}") from error
     return Track(t_us, latitude, longitude, easting, northing, nowhere, zone, northern)
+
+
+def _zone(places: list[_Place]) -> tuple[int, bool]:
+    """The one zone, 0 for none, and whether it is in the north; TrackError where there are several."""
+    first = places[0]
+    for place in places:
+        if (place.zone, place.letter in _NORTH) != (first.zone, first.letter in _NORTH):
+            raise TrackError(
+                f"{first.file.parent} mixes UTM zones: {_named(first)} in {first.file.name}, "
+                f"{_named(place)} in {place.file.name}: give all positions in one zone"
+            )
+    return first.zone, first.letter in _NORTH
 
 
 def _named(place: _Place) -> str:
