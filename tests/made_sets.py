@@ -201,7 +201,7 @@ def write_ddd20(folder: Path, name: str = "rec1499023756") -> Events:
     return events
 
 
-def write_qcr(folder: Path, stamp: str = "2021-08-19-08-25-42") -> Events:
+def write_qcr_event(folder: Path, stamp: str = "2021-08-19-08-25-42") -> Events:
     """Events of 20 s in HDF5."""
     folder.mkdir(parents=True, exist_ok=True)
     events = some_events(1_629_325_542_000_000, seconds=20.0)
@@ -229,3 +229,8 @@ def write_utm(folder: Path, name: str, fields: list[str]) -> Path:
         file = place / f"{beginning}{'@' * missing}.jpg"
         Image.fromarray(np.full((12, 16), 20 * n, np.uint8)).save(file)
     return place
+
+
+def write_utm_folders(folder: Path) -> Path:
+    """One image of the map."""
+    return write_utm(folder, "database", [SAN_FRANCISCO])

@@ -12,7 +12,6 @@ from PIL import Image
 
 from conftest import make_drive, write_drive
 from evplace.cli import main
-
 from made_sets import SAN_FRANCISCO, picture, write_gta, write_lens, write_own, write_robotcar, write_utm
 
 Capture = pytest.CaptureFixture[str]

@@ -7,39 +7,18 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from made_sets import (
-    SAN_FRANCISCO,
-    write_brisbane,
-    write_ddd20,
-    write_gta,
-    write_lens,
-    write_nsavp,
-    write_own,
-    write_qcr,
-    write_robotcar,
-    write_utm,
-)
 
+import made_sets
 from evplace import plugs
 from evplace.capture import open_source, open_traverse
 from evplace.datasets import drives, matching, open_drive
 from evplace.errors import DatasetError, RecordingError, SettingsError
+from made_sets import write_gta, write_robotcar
 
 MAKERS: dict[str, Callable[[Path], object]] = {
-    "brisbane": write_brisbane,
-    "ddd20": write_ddd20,
-    "gta": write_gta,
-    "lens": write_lens,
-    "nsavp": write_nsavp,
-    "own": write_own,
-    "qcr_event": write_qcr,
-    "robotcar": write_robotcar,
-    "utm_folders": lambda folder: write_utm(folder, "database", [SAN_FRANCISCO]),
+    name: getattr(made_sets, f"write_{name}") for name in plugs.names("datasets")
 }
-
-
-def test_every_data_set_has_a_fake() -> None:
-    assert sorted(MAKERS) == plugs.names("datasets")
+"""`made_sets` has a maker for each."""
 
 
 @pytest.mark.parametrize("name", sorted(MAKERS))

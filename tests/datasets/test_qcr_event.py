@@ -4,16 +4,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_sets import write_qcr
 
 from evplace.capture import open_traverse
 from evplace.datasets import drives, open_drive
 from evplace.datasets.qcr_event import MARKS_S, STAMPS
+from made_sets import write_qcr_event
 
 
 def test_the_way_between_the_marks(tmp_path: Path) -> None:
-    events = write_qcr(tmp_path)
-    write_qcr(tmp_path, STAMPS["fast1"])
+    events = write_qcr_event(tmp_path)
+    write_qcr_event(tmp_path, STAMPS["fast1"])
     assert drives(tmp_path) == ["normal1", "fast1"]
     begins = {}
     for name, start_s in (("normal1", 2.0), ("fast1", 7.7)):
@@ -27,7 +27,7 @@ def test_the_way_between_the_marks(tmp_path: Path) -> None:
 
 
 def test_images_before_the_start_have_no_position(tmp_path: Path) -> None:
-    write_qcr(tmp_path)
+    write_qcr_event(tmp_path)
     found = open_traverse(tmp_path, drive="normal1", dataset="qcr_event")
     assert found.track is not None
     assert not found.track.known[: 2 * 30 - 2].any()
