@@ -15,7 +15,7 @@ from evplace import datasets
 from evplace import settings as settings_room
 from evplace.cleaning import CleaningSettings, MaskSource, pixel_mask
 from evplace.datasets import Drive
-from evplace.errors import DamagedRecordingError, TrackError, TraverseError
+from evplace.errors import DamagedRecordingError, SettingsError, TrackError, TraverseError
 from evplace.events import Events, Size
 from evplace.frames import is_frames, open_frames
 from evplace.images import ImageSettings, frame_image
@@ -87,10 +87,13 @@ def open_source(
 ) -> Drive:
     """What `path` holds, as a drive: see `open_traverse`; `listing` and `fps` as in `open_frames`.
 
-    `size` and `time_unit` are for a recording, `drive` and `dataset` for a data set's folder.
+    `size` and `time_unit` are for a recording, `drive` and `dataset` for a data set's folder; SettingsError
+    where both are given.
     """
     place = Path(path)
     if drive is not None or dataset is not None:
+        if size is not None or time_unit is not None:
+            raise SettingsError("a data set knows its sensor's size and its unit of time: leave these out")
         return datasets.open_drive(place, drive, dataset)
     if is_frames(place):
         return Drive(film_of(place, open_frames(place, listing, fps)))

@@ -84,6 +84,16 @@ def test_a_video_is_simulated_or_kept(tmp_path: Path, capsys: Capture) -> None:
     assert info_of(out)["timed"]
 
 
+def test_a_query_is_made_as_its_map_was(tmp_path: Path, capsys: Capture) -> None:
+    video = write_video(tmp_path / "film.mp4")
+    for kind in ("events", "frames"):
+        said(capsys, "images", video, "-o", tmp_path / kind, "--kind", kind)
+        made = ("-o", tmp_path / f"{kind}.evp", "--scorer", "sad", "--run-length", 2)
+        said(capsys, "train", tmp_path / kind, *made)
+        query = ("evaluate", tmp_path / f"{kind}.evp", video, "--matcher", "best")
+        assert said(capsys, *query, "-o", tmp_path / f"{kind}.result")["accuracy"] > 0.8
+
+
 def test_a_folder_of_images_is_kept_or_simulated(tmp_path: Path, capsys: Capture) -> None:
     write_gta(tmp_path)
     folder = tmp_path / "day" / "images"
@@ -131,6 +141,7 @@ def test_faults_of_folders(tmp_path: Path, capsys: Capture) -> None:
     assert "none of the datasets" in fault(capsys, *images, "--dataset", "kitty", *out)
     write_gta(tmp_path / "set")
     assert "holds no drive 'dya': it holds day" in fault(capsys, *images, "--drive", "dya", *out)
+    assert "leave these out" in fault(capsys, *images, "--drive", "day", "--size", 4, 4, *out)
     write_own(tmp_path / "set", ("day",))
     assert "may be gta or own: say which with --dataset" in fault(capsys, *images, *out)
     assert "no camera images" in fault(
