@@ -14,7 +14,7 @@ Layout, in one folder or a folder a drive; the names stand in the authors' and o
 Events count time since 1970. The log is put on their clock as the authors do: its first sentence is the start
 of the dash camera's film, and START says when that was on the event camera's clock. Later code of the authors
 has starts that are up to 11 s later (github.com/Tobias-Fischer/sparse-event-vpr); neither was checked against
-the files, nor were the keys inside the HDF5 files.
+the files. That the HDF5 files hold t, x, y and p, at the root or in a group, is what others' readers expect.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """LENS: small event-count images of several places and drives, as the LENS system is trained on.
 
 Citation: A. D. Hines, M. Milford and T. Fischer, "A compact neuromorphic system for ultra
-energy-efficient, on-device robot localization", 2025. Licence: MIT.
+energy-efficient, on-device robot localization", Science Robotics, 2025. Licence: MIT.
 Address: https://github.com/AdamDHines/LENS, folder lens/dataset.
 
 Layout, checked against the files:

@@ -1,7 +1,7 @@
 """NSAVP: drives of one route, both ways, in the afternoon, at sunset and at night, DVXplorer, with poses.
 
 Citation: S. Carmichael et al., "Dataset and Benchmark: Novel Sensors for Autonomous Vehicle Perception",
-The International Journal of Robotics Research, 2024. Licence: see the download page.
+The International Journal of Robotics Research 44(3), 2025. Licence: see the download page.
 Address: https://umautobots.github.io/nsavp.
 
 Layout, from the set's own documentation (github.com/umautobots/nsavp_tools, documentation/data_format.md):

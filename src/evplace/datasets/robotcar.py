@@ -10,10 +10,12 @@ Layout, of the archives as they unpack (the documentation above; github.com/ori-
     2014-12-09-13-21-02/stereo/centre/<microseconds>.png      raw Bayer, GBRG, 1280 x 960
     2014-12-09-13-21-02/gps/ins.csv, gps/gps.csv              with timestamp, latitude, longitude
 
-There are no events: they are simulated from the images, as in the paper, which cuts them at 1/16 s. Each 2x2
-block of the Bayer pattern becomes one pixel, so images are 640 x 480 and nothing is interpolated. Chunks are
-downloaded one by one: a chunk may be missing, an image of a chunk that is there may not. The positions are
-ins.csv's where that is there, whatever its ins_status says, else gps.csv's.
+There are no events: they are simulated from the images, as in the paper, which cuts them at 1/16 s. At 16
+images a second the picture often moves by more than a pixel, which the simulator remarks upon. Each 2x2 block
+of the Bayer pattern becomes one pixel, so images are 640 x 480 and nothing is interpolated.
+
+Chunks are downloaded one by one: a chunk may be missing, an image of a chunk that is there may not. The
+positions are ins.csv's where that is there, whatever its ins_status says, else gps.csv's.
 """
 
 from __future__ import annotations

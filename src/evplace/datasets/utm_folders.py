@@ -9,10 +9,10 @@ Layout, from that repository's README and code:
     queries/@...                                                                what is to be found in it
 
 The fields are easting, northing, zone number, zone letter, latitude, longitude, then panorama, tile, heading,
-pitch, roll, height, timestamp, note, and the suffix. Only the first two are required: where no name has a
-zone the positions lie on a plane of their own, which can be compared within the set only. `write_images` puts
-the time into the note, as t1500us; where all names have such a note it gives order and times, else the names
-give the order, at one image a second.
+pitch, roll, height, timestamp, note, and the suffix. Only the first two are required, the rest may be
+anything: where no name has a zone the positions lie on a plane of their own, to be compared within the set.
+`write_images` puts the time into the note, as t1500us; where all names have such a note it gives order and
+times, else the names give the order, at one image a second. Images of several sizes take the first one's.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evplace.datasets import Drive
 from evplace.errors import TrackError, TraverseError
-from evplace.frames import SUFFIXES, Frames
+from evplace.frames import SUFFIXES, Frames, read_image
 from evplace.images import ImageSettings
 from evplace.simulators.frames import film_of
 from evplace.storage import new_folder
@@ -70,7 +71,8 @@ def open_drive(folder: Path, name: str) -> Drive:
     timed = places[0].t_us is not None
     times = [place.t_us for place in places] if timed else [n * 1_000_000 for n in range(len(places))]
     t_us = np.array(times, np.int64)
-    frames = Frames(tuple(place.file for place in places), t_us, timed)
+    like = read_image(places[0].file)
+    frames = Frames(tuple(place.file for place in places), t_us, timed, lambda file: _alike(file, like))
     images = ImageSettings(crop_bottom=0.0)
     return Drive(film_of(files[0].parent, frames), _track(places, t_us), images=images)
 
@@ -104,7 +106,7 @@ def _images(folder: Path, name: str) -> list[Path]:
     for split in SPLITS:
         place = folder / split / name
         if place.is_dir():
-            files = [file for file in place.iterdir() if file.suffix.lower() in SUFFIXES]
+            files = [file for file in place.rglob("*") if file.suffix.lower() in SUFFIXES]
             if files and any(file.name.startswith("@") for file in files):
                 return sorted(files)
     return []
@@ -114,18 +116,30 @@ def _place(file: Path) -> _Place:
     fields = [*file.name.split("@"), *[""] * 15][:16]
     try:
         easting, northing = float(fields[1]), float(fields[2])
-        zone = int(fields[3]) if fields[3] else 0
     except ValueError:
         raise TrackError(
             f"{file} does not say where it was taken: its name must begin with @UTM_east@UTM_north@"
         ) from None
     if not (np.isfinite(easting) and np.isfinite(northing)):
         raise TrackError(f"{file}: its position is not a number")
-    letter = fields[4].upper()
-    if (zone and not 1 <= zone <= 60) or (zone and letter not in [*_NORTH, *_SOUTH]):
-        raise TrackError(f"{file}: there is no UTM zone '{fields[3]}{fields[4]}': 10 and S stand for 10S")
+    letter = fields[4].upper() if fields[4].upper() in [*_NORTH, *_SOUTH] else ""
+    zone = int(fields[3]) if letter and fields[3].isdecimal() else 0
+    if letter and not 1 <= zone <= 60:
+        raise TrackError(f"{file}: there is no UTM zone '{fields[3]}{letter}': 10 and S stand for 10S")
     note = _NOTE.fullmatch(fields[14])
     return _Place(file, easting, northing, zone, letter, int(note[1]) if note else None)
+
+
+def _alike(file: Path, like: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """An image in the size and the colours of another."""
+    from PIL import Image
+
+    image = read_image(file)
+    if image.shape == like.shape:
+        return image
+    size = (like.shape[1], like.shape[0])
+    made = Image.fromarray(image).convert("L" if like.ndim == 2 else "RGB").resize(size, Image.Resampling.BOX)
+    return np.asarray(made, np.uint8)
 
 
 def _in_order(places: list[_Place]) -> list[_Place]:
@@ -135,7 +149,7 @@ def _in_order(places: list[_Place]) -> list[_Place]:
     return [place._replace(t_us=None) for place in places]
 
 
-def _track(places: list[_Place], t_us: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> Track:
+def _track(places: list[_Place], t_us: NDArray[np.int64]) -> Track:
     import utm
 
     zone, northern = _zone(places)
