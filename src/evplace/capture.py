@@ -234,6 +234,8 @@ def _as(kind: Kind | None, drive: Drive) -> Recording | SimulatedRecording | Fil
                 f"{drive.source.path} is an event recording: it holds no camera images to keep"
             )
         return drive.source
+    if kind == "events" and drive.simulate is None:
+        raise TraverseError(f"the images in {drive.source.path} are no film: no events can be simulated")
     simulated = kind == "events" or (kind is None and drive.simulate)
     return SimulatedRecording(drive.source) if simulated else drive.source
 

@@ -147,6 +147,8 @@ def test_faults_of_folders(tmp_path: Path, capsys: Capture) -> None:
     assert "no camera images" in fault(
         capsys, *images, "--dataset", "own", "--drive", "day", "--kind", "frames", *out
     )
+    write_lens(tmp_path / "lens")
+    assert "are no film" in fault(capsys, "images", tmp_path / "lens", "--kind", "events", *out)
     write_utm(tmp_path / "utm", "queries", [SAN_FRANCISCO, "@nan@1.0"])
     assert "not a number" in fault(capsys, "images", tmp_path / "utm", *out)
     assert not (tmp_path / "t").exists()

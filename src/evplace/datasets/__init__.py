@@ -39,8 +39,9 @@ class Drive:
     """Where the camera was, on the clock of `source`."""
     mask: Path | None = None
     """A list of the sensor's hot pixels: a text file of `x,y` lines."""
-    simulate: bool = False
-    """Whether camera images become simulated events unless they are asked for themselves."""
+    simulate: bool | None = False
+    """Whether camera images become simulated events unless they are asked for themselves; None: never,
+    because they are no film (event images, or photos in no order of time)."""
     windows: WindowSettings = field(default_factory=WindowSettings)
     """How events are cut, unless the user says otherwise."""
     images: ImageSettings = field(default_factory=ImageSettings)

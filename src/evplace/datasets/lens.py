@@ -47,7 +47,8 @@ def open_drive(folder: Path, name: str) -> Drive:
     frames = open_frames(places[0], folder / f"{name}.csv", IMAGES_A_SECOND)
     film = film_of(places[0], frames)
     width, height = film.size
-    return Drive(film, images=ImageSettings(width=width, height=height, blur=False, crop_bottom=0.0))
+    images = ImageSettings(width=width, height=height, blur=False, crop_bottom=0.0)
+    return Drive(film, simulate=None, images=images)
 
 
 def _is_listing(file: Path) -> bool:

@@ -73,8 +73,8 @@ def open_drive(folder: Path, name: str) -> Drive:
     t_us = np.array(times, np.int64)
     like = read_image(places[0].file)
     frames = Frames(tuple(place.file for place in places), t_us, timed, lambda file: _alike(file, like))
-    images = ImageSettings(crop_bottom=0.0)
-    return Drive(film_of(files[0].parent, frames), _track(places, t_us), images=images)
+    film = film_of(files[0].parent, frames)
+    return Drive(film, _track(places, t_us), simulate=None, images=ImageSettings(crop_bottom=0.0))
 
 
 def write_images(traverse: Traverse, folder: str | Path, overwrite: bool = False) -> int:
