@@ -72,6 +72,8 @@ PRESETS = {
 """paper: as printed. notebook: as the author's published notebook does."""
 
 
+KEPT = ("source", "input", "sensor", "windows", "images", "cleaning", "spacing")
+"""What a map keeps of how its traverse was made."""
 TRAINED = ("network", "notebook")
 """Scorers whose map is a trained network; to all others the images themselves are the map."""
 
@@ -99,7 +101,7 @@ def train(
     if not used.any():
         raise TraverseError("no image of the traverse has a place: check its track and its times")
     description = {
-        **{key: day.info.get(key) for key in ("source", "input", "sensor", "windows", "images")},
+        **{key: day.info.get(key) for key in KEPT},
         "image_shape": list(day.images.shape[1:]),
         "zone": [day.track.zone, day.track.northern] if day.track is not None else None,
         "scorer": scorer_settings or {},
