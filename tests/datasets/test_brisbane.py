@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_sets import some_events, write_brisbane
 
 from evplace.capture import open_traverse
 from evplace.datasets import drives, open_drive
 from evplace.errors import DatasetError
 from evplace.readers import Recording
+from made_sets import some_events, write_brisbane
 
 
 def test_a_drive_has_events_track_and_hot_pixels(tmp_path: Path) -> None:

@@ -5,12 +5,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from made_sets import write_ddd20
 
 from evplace.datasets import drives, open_drive
 from evplace.errors import DamagedRecordingError, TrackError
 from evplace.events import Events
 from evplace.readers import Recording, open_recording
+from made_sets import write_ddd20
 
 
 def test_events_on_the_computers_clock(tmp_path: Path) -> None:

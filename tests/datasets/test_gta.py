@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_sets import write_gta
 
 from evplace.capture import open_traverse
 from evplace.datasets import drives, open_drive
 from evplace.errors import DatasetError, TrackError, TraverseError
 from evplace.simulators.frames import Film
+from made_sets import write_gta
 
 
 def test_frames_and_poses(tmp_path: Path) -> None:

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_sets import write_lens
 
 from evplace.capture import open_traverse
 from evplace.datasets import drives, open_drive
 from evplace.errors import DatasetError, TraverseError
+from made_sets import write_lens
 
 
 def test_count_images_are_kept_as_they_are(tmp_path: Path) -> None:

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_sets import ecef, write_nsavp
 
 from evplace.datasets import drives, open_drive
 from evplace.datasets.nsavp import geographic
 from evplace.errors import DatasetError, TrackError
 from evplace.readers import Recording
+from made_sets import ecef, write_nsavp
 
 
 @given(st.floats(-80, 84), st.floats(-179.9, 179.9), st.floats(-100, 5000))

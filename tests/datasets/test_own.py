@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_sets import picture, write_own
 from PIL import Image
 
 from evplace.capture import open_traverse
 from evplace.datasets import drives, matching, open_drive
 from evplace.errors import DatasetError, TraverseError
+from made_sets import picture, write_own
 
 
 def write_film(folder: Path, timed: bool = True) -> None:

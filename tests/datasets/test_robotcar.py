@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_sets import picture, write_robotcar
 from PIL import Image
 
 from evplace.capture import open_traverse
@@ -12,6 +11,7 @@ from evplace.datasets import drives, open_drive
 from evplace.datasets.robotcar import demosaiced
 from evplace.errors import DatasetError, TrackError, TraverseError
 from evplace.simulators.frames import Film
+from made_sets import picture, write_robotcar
 
 
 def test_bayer_blocks_become_pixels() -> None:

@@ -12,9 +12,10 @@ import pytest
 from evplace.city import CitySettings, generate
 from evplace.cli import main
 from evplace.errors import InputError, SettingsError
-from evplace.reproduction import Choice, reproduce, table2
+from evplace.reproduction import Choice, ablations, figure5, real, reproduce, table2
 from evplace.reproduction._cases import Case
 from evplace.reproduction._cities import Cities
+from evplace.reproduction._real_sets import RealSet
 from evplace.reproduction._recipes import inputs, methods, recipes
 from evplace.traverse import Traverse
 
@@ -135,11 +136,36 @@ def test_images_made_anew_from_events_are_the_drives_own(city: Path, out: Path) 
         np.testing.assert_array_equal(made.xy, given.xy)
 
 
-@pytest.mark.parametrize("family", ["table2", "figure5", "ablations"])
-def test_every_recipe_is_read(family: str) -> None:
-    import importlib
+def test_real_sets_are_judged_by_their_own_truth(data: Path, out: Path) -> None:
+    table = reproduce("real", out, data=data, choice=Choice(1, TRAINING), workers=1)
+    found = {(row["query"], row["matcher"], row["rule"]): row["mean"] for row in table["rows"]}
+    # What raw correlation finds is known of these sets (9 %, 67 % within 2; 8.4 %).
+    assert found["LENS example", "raw correlation", "within 0"] == pytest.approx(9)
+    assert found["LENS example", "raw correlation", "within 2"] == pytest.approx(67)
+    assert found["Brisbane, 7x7 pixels", "raw correlation", "given"] == pytest.approx(8.4, abs=0.1)
+    assert found["Nordland, 64x32 grey", "blurred correlation, sequence", "within 10"] > 95
+    assert len(list(real.tables(table))) == 3
 
-    kind = importlib.import_module(f"evplace.reproduction.{family}").Recipe
+
+def test_real_sets_that_are_not_there_are_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="give the folder that holds them with --data"):
+        reproduce("real", tmp_path / "out")
+    with pytest.raises(InputError, match="holds none of the real sets"):
+        reproduce("real", tmp_path / "out", data=tmp_path)
+    with pytest.raises(InputError, match="there is no folder of data"):
+        reproduce("real", tmp_path / "out", data=tmp_path / "nowhere")
+
+
+@pytest.mark.parametrize(
+    ("family", "kind"),
+    [
+        ("table2", table2.Recipe),
+        ("figure5", figure5.Recipe),
+        ("ablations", ablations.Recipe),
+        ("real", RealSet),
+    ],
+)
+def test_every_recipe_is_read(family: str, kind: type[Any]) -> None:
     found = recipes(family, kind)
     assert [recipe.order for recipe in found] == list(range(1, len(found) + 1))
 

@@ -42,7 +42,7 @@ class RealSet:
     tolerances: tuple[int, ...] = ()
     """How many images off an answer may be, where both drives are in step."""
     truth: str = ""
-    """Or a matrix below it, (references, queries)."""
+    """Or a matrix below it, (queries, references)."""
 
     @property
     def rules(self) -> dict[str, str]:
@@ -102,7 +102,7 @@ class RealSets:
         n_queries, n_items = len(query), len(place_map.items)
         if real.truth:
             matrix = self.data / real.truth
-            return {rule: by_matrix(matrix, n_queries, n_items, "references") for rule in real.rules}
+            return {rule: by_matrix(matrix, n_queries, n_items) for rule in real.rules}
         return {
             rule: by_frames(n_queries, n_items, tolerance)
             for rule, tolerance in zip(real.rules, real.tolerances, strict=True)

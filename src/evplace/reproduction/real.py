@@ -1,7 +1,7 @@
 """Real sets: how often the best item is right, by each set's own truth.
 
 They have no positions; each image of the drive that is learned is a place. The network is trained as the
-paper says. What a method does not stand by counts as wrong: there is nothing unseen in these drives.
+paper says. An answer that a method does not stand by is wrong: there is nothing unseen in these drives.
 """
 
 from __future__ import annotations
