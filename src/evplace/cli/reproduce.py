@@ -59,5 +59,7 @@ def run(args: Args) -> int:
         return 0
     for table in plugs.load("reproduction", args.name).tables(document):
         print_table(*table)
-    print(f"Kept in {args.out}/{args.name}.json; evplace report {args.out} makes a page of it")
+    minutes = document["cpu_s"] / 60
+    print(f"Kept in {args.out}/{args.name}.json, {minutes:.1f} minutes of one core in all")
+    print(f"evplace report {args.out} makes a page of it")
     return 0

@@ -78,7 +78,7 @@ def reproduce(
     folder, chosen = Path(out), choice or Choice()
     family = plugs.load("reproduction", name)
     count = workers or os.cpu_count() or 1
-    began, cpu_before = time.monotonic(), _cpu_s()
+    began = time.monotonic()
     with locked(folder / name):
         drives = _real_sets(data) if family.NEEDS == "data" else _cities(folder, city, count)
         runs = Runs(folder, drives.settings)
@@ -89,7 +89,7 @@ def reproduce(
             "settings": {"drives": drives.settings, "seeds": chosen.seeds, "train": chosen.train},
             "versions": versions(),
             "took_s": round(time.monotonic() - began, 1),
-            "cpu_s": round(_cpu_s() - cpu_before, 1),
+            "cpu_s": round(runs.cpu_s(cases), 1),
         }
         with new_file(folder / f"{name}.json", overwrite=True) as partial:
             write_json(partial, document)
@@ -149,9 +149,3 @@ def _answer(
 def _shared(case: Case) -> tuple[str, str, str]:
     """Cases of one query and scorer stand together, so that rows are scored once."""
     return case.query, case.scorer, str(case.scorer_settings)
-
-
-def _cpu_s() -> float:
-    """Processor seconds of this process and of its ended children so far."""
-    times = os.times()
-    return times.user + times.system + times.children_user + times.children_system

@@ -32,6 +32,12 @@ class Runs:
         with new_file(self._file(case), overwrite=True) as partial:
             write_json(partial, {"case": case.to_dict(), **outcome})
 
+    def cpu_s(self, cases: list[Case]) -> float:
+        """Processor seconds that `cases` took when they were run, with the trainings that they share."""
+        maps = {self.map_file(case) for case in cases if case.train is not None}
+        trained = (read_json(file / "map.json", "a map")["settings"]["train_cpu_s"] for file in maps)
+        return float(sum(trained) + sum(self.found(case)["cpu_s"] for case in cases))
+
     def map_file(self, case: Case) -> Path:
         """Where the map of a case is kept."""
         return self.out / "maps" / f"{case.map_key(self.source)}.evp"
