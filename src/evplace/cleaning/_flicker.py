@@ -67,6 +67,10 @@ class FlickerMeter:
             self._teeth, self._table, self._start_us, self._sums, self._events, self._power, self._pairs,
         )  # fmt: skip
 
+    def pairs(self) -> NDArray[np.float64]:
+        """(region rows, region columns) pairs of events compared: chance alone gives 1 / sqrt(pairs)."""
+        return self._pairs.reshape(self._grid).copy()
+
     def strengths(self) -> NDArray[np.float64]:
         """(region rows, region columns, frequencies) 0 to 1, over all complete windows.
 
