@@ -1,0 +1,86 @@
+"""Stretches in which the car stands: the events fall off, and the track does not move.
+
+Many images of one place make a map lopsided and a match easy to overrate.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.doctor._outcome import Curve, Finding, Outcome, State
+from evplace.doctor._speed import speed_at
+from evplace.doctor._subject import BIN_US, Subject, stretches
+
+OF = ("events", "frames")
+
+LOW = 0.15
+"""Share of the busy rate (its 90th percentile) below which the scene seems to stand."""
+SLOW_MPS = 0.7
+"""Speed below which the car stands: a receiver's noise is less, a walk is more."""
+SHORTEST_S = 3.0
+"""Shorter stands are left alone."""
+MUCH = 5.0
+"""Per cent of the time above which stands should be thinned out."""
+
+
+class Check:
+    """Asks the subject's activity, and its track."""
+
+    def __init__(self, subject: Subject) -> None:
+        self._subject = subject
+
+    def see(self, part: object) -> None:
+        """Nothing: the subject counts."""
+
+    def outcome(self) -> Outcome:
+        """Findings: quiet stretches, and stand-still where a track covers the recording."""
+        t_us, activity = self._subject.smooth_activity()
+        if len(t_us) * BIN_US < 2 * SHORTEST_S * 1e6:
+            told = f"Cannot be told: the recording is shorter than {2 * SHORTEST_S:g} s."
+            return Outcome([Finding("quiet stretches", "unknown", None, "%", told)])
+        quiet = activity < LOW * np.percentile(activity, 90)
+        findings = [_finding("quiet stretches", quiet, self._subject, t_us, "the image hardly changes")]
+        if self._subject.track is None:
+            return Outcome(findings)
+        mps = speed_at(self._subject.track, t_us.astype(np.float64))
+        if np.isnan(mps).all():
+            return Outcome(findings)
+        findings.append(
+            _finding("stand-still", mps < SLOW_MPS, self._subject, t_us, "the track stands still")
+        )
+        seconds = self._subject.seconds(t_us)
+        spans = [
+            (float(seconds[start]), float(seconds[stop - 1]), "stands")
+            for start, stop in _long(mps < SLOW_MPS)
+        ]
+        return Outcome(
+            findings, [Curve("speed", "Speed of the track", "time in s", "m/s", seconds, mps, spans)]
+        )
+
+
+def _long(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    return [(a, b) for a, b in stretches(where) if (b - a) * BIN_US >= SHORTEST_S * 1e6]
+
+
+def _finding(
+    name: str, where: NDArray[np.bool_], subject: Subject, t_us: NDArray[np.int64], what: str
+) -> Finding:
+    found = _long(where)
+    seconds = sum(stop - start for start, stop in found) * BIN_US / 1e6
+    share = 100 * seconds / max(subject.span_s, 1e-6)
+    if not found:
+        return Finding(name, "good", 0.0, "%", f"There is no stretch of {SHORTEST_S:g} s in which {what}.")
+    longest = max(found, key=lambda stretch: stretch[1] - stretch[0])
+    told = (
+        f"{what.capitalize()} in {len(found)} stretches, {seconds:.1f} s in all; the longest is "
+        f"{(longest[1] - longest[0]) * BIN_US / 1e6:.1f} s "
+        f"from {float(subject.seconds(t_us)[longest[0]]):.1f} s on."
+    )
+    state: State = "good" if share < MUCH else "look"
+    thin = (
+        "--every-m 1 makes an image a metre"
+        if subject.track is not None
+        else "--every-events N makes few images"
+    )
+    return Finding(name, state, share, "%", told, "" if state == "good" else f"{thin} where it stands")
