@@ -65,7 +65,8 @@ def _gaps(track: Track) -> Finding:
     return Finding(
         "GPS gaps", state, share, "%",
         f"{int(far.sum()):,} pairs of fixes, {share:.1f} % of the track's time, are over 1 s or 20 m "
-        f"apart: between them no position is known (longest {steps_s.max():.1f} s, usual {np.median(steps_s):.1f} s).",
+        f"apart: between them no position is known (longest {steps_s.max():.1f} s, usual "
+        f"{np.median(steps_s):.1f} s).",
         "" if state == "good" else "log at 5 Hz or more; images without a position are left out of the truth",
     )  # fmt: skip
 
