@@ -29,6 +29,11 @@ class Finding:
     """What to do; empty where nothing is needed."""
 
 
+def counted(number: int, one: str, many: str) -> str:
+    """1 fix, 2 fixes, 1,000 fixes."""
+    return f"{number:,} {one if number == 1 else many}"
+
+
 @dataclass(frozen=True)
 class Curve:
     """A line over another quantity."""

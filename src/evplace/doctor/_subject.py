@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numba import njit
@@ -119,8 +119,7 @@ class Subject:
         if self.kind == "frames":
             grid = np.arange(t_us[0], t_us[-1], BIN_US)
             t_us, activity = grid, np.interp(grid, t_us, activity)
-        second = np.ones(1_000_000 // BIN_US + 1)
-        return t_us, np.convolve(activity, second, "same") / np.convolve(np.ones(len(t_us)), second, "same")
+        return t_us, mean_around(activity, 500_000 // BIN_US)
 
     def seconds(self, t_us: NDArray[np.int64] | int) -> NDArray[np.float64]:
         """Seconds since the first event or frame."""
@@ -131,6 +130,14 @@ class Subject:
             self.t_first_us = first_us
         self.t_last_us = last_us
         self.parts += parts
+
+
+def mean_around(values: NDArray[Any], reach: int) -> NDArray[np.float64]:
+    """(n,) mean of each value and up to `reach` before and after it."""
+    sums = np.concatenate([[0.0], np.cumsum(values, dtype=np.float64)])
+    at = np.arange(len(values))
+    first, past = np.maximum(at - reach, 0), np.minimum(at + reach + 1, len(values))
+    return np.asarray((sums[past] - sums[first]) / (past - first), np.float64)
 
 
 def stretches(where: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.doctor._outcome import Finding, Outcome, State
+from evplace.doctor._outcome import Finding, Outcome, State, counted
 from evplace.doctor._subject import BIN_US, Subject
 from evplace.events import Events
 
@@ -67,7 +67,7 @@ def _finding(starts: NDArray[np.int64], ends: NDArray[np.int64], subject: Subjec
     state: State = "bad" if total > 0.05 * subject.span_s else "look"
     return Finding(
         "gaps", state, total, "s",
-        f"The whole sensor is silent {len(starts)} times, {total:.3f} s in all; the longest is "
-        f"{lengths[longest]:.3f} s at {float(subject.seconds(starts)[longest]):.3f} s: events were lost.",
+        f"The whole sensor is silent {counted(len(starts), 'time', 'times')}, {total:.3f} s in all; the "
+        f"longest is {lengths[longest]:.3f} s at {float(subject.seconds(starts)[longest]):.3f} s: events were lost.",
         "check cable, hub and disk, or lower the event rate (biases); --every-events N leaves gaps out",
     )  # fmt: skip

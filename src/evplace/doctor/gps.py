@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.doctor._outcome import Finding, Outcome, State
-from evplace.doctor._subject import BIN_US, Subject
+from evplace.doctor._outcome import Finding, Outcome, State, counted
+from evplace.doctor._subject import BIN_US, Subject, mean_around
 from evplace.tracks import Track
 
 OF = ("events", "frames")
@@ -42,7 +42,10 @@ def _quality(track: Track) -> Finding:
     lost = sum(track.dropped.values())
     share = 100 * lost / (lost + len(track))
     seconds = (track.t_us[-1] - track.t_us[0]) / 1e6
-    told = f"{len(track):,} fixes in {seconds:.1f} s"
+    told = f"{counted(len(track), 'fix', 'fixes')} in {seconds:.1f} s"
+    if len(track) < 2:
+        advice = "give the log of the whole drive"
+        return Finding("GPS fixes", "bad", share, "% unusable", f"{told}: that makes no track.", advice)
     if not lost:
         return Finding("GPS fixes", "good", 0.0, "% unusable", f"{told}; all can be used.")
     reasons = ", ".join(f"{number:,} {reason}" for reason, number in track.dropped.items())
@@ -64,8 +67,8 @@ def _gaps(track: Track) -> Finding:
     state: State = "good" if share < 1 else "look" if share < 20 else "bad"
     return Finding(
         "GPS gaps", state, share, "%",
-        f"{int(far.sum()):,} pairs of fixes, {share:.1f} % of the track's time, are over 1 s or 20 m "
-        f"apart: between them no position is known (longest {steps_s.max():.1f} s, usual "
+        f"{counted(int(far.sum()), 'step', 'steps')} from one fix to the next, {share:.1f} % of the track's "
+        f"time, are over 1 s or 20 m: no position is known inside them (longest {steps_s.max():.1f} s, usual "
         f"{np.median(steps_s):.1f} s).",
         "" if state == "good" else "log at 5 Hz or more; images without a position are left out of the truth",
     )  # fmt: skip
@@ -79,7 +82,7 @@ def _jumps(track: Track) -> Finding:
     worst = int(np.argmax(np.where(jump, steps, 0)))
     return Finding(
         "GPS jumps", "look" if jump.mean() < 0.01 else "bad", int(jump.sum()), "jumps",
-        f"{int(jump.sum())} steps are far longer than those around them; the longest is "
+        f"{counted(int(jump.sum()), 'step is', 'steps are')} far longer than those around; the longest is "
         f"{steps[worst]:,.0f} m in {(track.t_us[worst + 1] - track.t_us[worst]) / 1e6:.1f} s.",
         "take these fixes out of the log, or smooth it",
     )  # fmt: skip
@@ -97,7 +100,7 @@ def jumps(track: Track) -> NDArray[np.bool_]:
 def _repeated(track: Track) -> Finding:
     """A receiver slower than its log repeats its positions: the track moves in steps."""
     same = (np.diff(track.easting) == 0) & (np.diff(track.northing) == 0)
-    moves = np.convolve(~same, np.ones(2 * AROUND + 1), "same") >= 2
+    moves = mean_around(~same, AROUND) * (2 * AROUND + 1) >= 2
     share = 100 * float(np.mean(same & moves))
     told = f"{share:.1f} % of the fixes repeat the position before them while the track moves."
     if share < 20:
@@ -112,17 +115,15 @@ def _covered(subject: Subject, track: Track) -> Finding:
         return Finding("GPS coverage", "unknown", None, "%", "Cannot be told: the recording holds nothing.")
     grid = t_us if subject.kind == "events" else np.arange(subject.t_first_us, subject.t_last_us + 1, BIN_US)
     share = 100 * float(track.at(grid).known.mean())
-    state: State = "good" if share >= 95 else "look" if share >= 50 else "bad"
-    told = f"{share:.1f} % of the recording has a position."
-    if not share:
-        told = (
+    if track.t_us[-1] < subject.t_first_us or track.t_us[0] > subject.t_last_us:
+        return Finding(
+            "GPS coverage", "bad", 0.0, "%",
             f"The track and the recording do not overlap: the track runs from {track.t_us[0] / 1e6:.3f} s to "
             f"{track.t_us[-1] / 1e6:.3f} s, the recording from {subject.t_first_us / 1e6:.3f} s to "
-            f"{subject.t_last_us / 1e6:.3f} s."
-        )
-    advice = (
-        ""
-        if state == "good"
-        else "give the recording's own track; shift its times with open_track(offset_us=...)"
-    )
+            f"{subject.t_last_us / 1e6:.3f} s.",
+            "give the recording's own track, or shift its times: open_track(..., offset_us=N)",
+        )  # fmt: skip
+    state: State = "good" if share >= 95 else "look" if share >= 50 else "bad"
+    told = f"{share:.1f} % of the recording has a position."
+    advice = "" if state == "good" else "images without a position are left out of the truth: see GPS gaps"
     return Finding("GPS coverage", state, share, "%", told, advice)

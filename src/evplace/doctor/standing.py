@@ -8,11 +8,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.doctor._outcome import Curve, Finding, Outcome, State
+from evplace.doctor._outcome import Curve, Finding, Outcome, State, counted
 from evplace.doctor._speed import speed_at
 from evplace.doctor._subject import BIN_US, Subject, stretches
 
 OF = ("events", "frames")
+
+Floats = NDArray[np.float64]
+Stretches = list[tuple[int, int]]
 
 LOW = 0.15
 """Share of the busy rate (its 90th percentile) below which the scene seems to stand."""
@@ -39,42 +42,57 @@ class Check:
         if len(t_us) * BIN_US < 2 * SHORTEST_S * 1e6:
             told = f"Cannot be told: the recording is shorter than {2 * SHORTEST_S:g} s."
             return Outcome([Finding("quiet stretches", "unknown", None, "%", told)])
-        quiet = activity < LOW * np.percentile(activity, 90)
+        quiet = _long(activity <= LOW * np.percentile(activity, 90))
         findings = [_finding("quiet stretches", quiet, self._subject, t_us, "the image hardly changes")]
-        if self._subject.track is None:
-            return Outcome(findings)
-        mps = speed_at(self._subject.track, t_us.astype(np.float64))
-        if np.isnan(mps).all():
-            return Outcome(findings)
-        findings.append(
-            _finding("stand-still", mps < SLOW_MPS, self._subject, t_us, "the track stands still")
-        )
-        seconds = self._subject.seconds(t_us)
-        spans = [
-            (float(seconds[start]), float(seconds[stop - 1]), "stands")
-            for start, stop in _long(mps < SLOW_MPS)
+        drawings = [
+            _curve(
+                "activity", "Activity, mean over a second", self._unit(), self._subject, t_us, activity, quiet
+            )
         ]
-        return Outcome(
-            findings, [Curve("speed", "Speed of the track", "time in s", "m/s", seconds, mps, spans)]
-        )
+        mps = self._speed(t_us)
+        if not np.isnan(mps).all():
+            stands = _long(mps < SLOW_MPS)
+            findings.append(_finding("stand-still", stands, self._subject, t_us, "the track stands still"))
+            drawings.append(_curve("speed", "Speed of the track", "m/s", self._subject, t_us, mps, stands))
+        return Outcome(findings, drawings)
+
+    def _speed(self, t_us: NDArray[np.int64]) -> Floats:
+        """Metres a second; NaN throughout without a track."""
+        if self._subject.track is None:
+            return np.full(len(t_us), np.nan)
+        return speed_at(self._subject.track, t_us.astype(np.float64))
+
+    def _unit(self) -> str:
+        return "events/s" if self._subject.kind == "events" else "pixels/s"
 
 
-def _long(where: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _long(where: NDArray[np.bool_]) -> Stretches:
     return [(a, b) for a, b in stretches(where) if (b - a) * BIN_US >= SHORTEST_S * 1e6]
 
 
-def _finding(
-    name: str, where: NDArray[np.bool_], subject: Subject, t_us: NDArray[np.int64], what: str
-) -> Finding:
-    found = _long(where)
+def _curve(
+    name: str,
+    title: str,
+    up: str,
+    subject: Subject,
+    t_us: NDArray[np.int64],
+    values: Floats,
+    found: Stretches,
+) -> Curve:
+    seconds = subject.seconds(t_us)
+    spans = [(float(seconds[start]), float(seconds[stop - 1]), "stands") for start, stop in found]
+    return Curve(name, title, "time in s", up, seconds, values, spans)
+
+
+def _finding(name: str, found: Stretches, subject: Subject, t_us: NDArray[np.int64], what: str) -> Finding:
     seconds = sum(stop - start for start, stop in found) * BIN_US / 1e6
     share = 100 * seconds / max(subject.span_s, 1e-6)
     if not found:
         return Finding(name, "good", 0.0, "%", f"There is no stretch of {SHORTEST_S:g} s in which {what}.")
     longest = max(found, key=lambda stretch: stretch[1] - stretch[0])
     told = (
-        f"{what.capitalize()} in {len(found)} stretches, {seconds:.1f} s in all; the longest is "
-        f"{(longest[1] - longest[0]) * BIN_US / 1e6:.1f} s "
+        f"{what.capitalize()} in {counted(len(found), 'stretch', 'stretches')}, {seconds:.1f} s in all; "
+        f"the longest is {(longest[1] - longest[0]) * BIN_US / 1e6:.1f} s "
         f"from {float(subject.seconds(t_us)[longest[0]]):.1f} s on."
     )
     state: State = "good" if share < MUCH else "look"
