@@ -68,6 +68,7 @@ def _finding(starts: NDArray[np.int64], ends: NDArray[np.int64], subject: Subjec
     return Finding(
         "gaps", state, total, "s",
         f"The whole sensor is silent {counted(len(starts), 'time', 'times')}, {total:.3f} s in all; the "
-        f"longest is {lengths[longest]:.3f} s at {float(subject.seconds(starts)[longest]):.3f} s: events were lost.",
+        f"longest is {lengths[longest]:.3f} s at {float(subject.seconds(starts)[longest]):.3f} s: events are "
+        "missing.",
         "check cable, hub and disk, or lower the event rate (biases); --every-events N leaves gaps out",
     )  # fmt: skip
