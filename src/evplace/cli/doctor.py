@@ -87,9 +87,12 @@ def _lines(found: Examination) -> list[str]:
 def _told(finding: Finding, width: int) -> list[str]:
     head = f"  {finding.state:<7}  {finding.name:<{width}}  "
     indent = " " * len(head)
-    lines = textwrap.wrap(finding.sentence, WIDTH, initial_indent=head, subsequent_indent=indent)
+    lines = _wrapped(finding.sentence, head, indent)
     if finding.advice:
-        lines += textwrap.wrap(
-            f"-> {finding.advice}", WIDTH, initial_indent=indent, subsequent_indent=indent + "   "
-        )
+        lines += _wrapped(f"-> {finding.advice}", indent, indent + "   ")
     return lines
+
+
+def _wrapped(text: str, first: str, other: str) -> list[str]:
+    """Lines of a text; flags are not broken at their hyphens."""
+    return textwrap.wrap(text, WIDTH, initial_indent=first, subsequent_indent=other, break_on_hyphens=False)

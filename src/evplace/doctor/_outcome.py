@@ -47,7 +47,7 @@ class Curve:
     x: NDArray[np.float64]
     y: NDArray[np.float64]
     spans: Sequence[tuple[float, float, str]] = ()
-    """Stretches to shade: from, to, what."""
+    """Stretches to shade, all of one kind: from, to, what."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from evplace.cleaning import count_pixels
+from evplace.doctor._silences import Silences
 from evplace.events import Events, Size
 from evplace.readers import Recording
 from evplace.tracks import Track
@@ -20,6 +21,9 @@ BIN_US = 100_000
 """Events are counted in each tenth of a second."""
 _LONGEST = 1 << 23
 """Bins that are laid out at most, nine days: a clock that leaps a year ahead must not cost all memory."""
+
+REACH_US = 500_000
+"""Activity is averaged over so long before and after."""
 
 Kind = Literal["events", "frames"]
 
@@ -75,6 +79,7 @@ class Subject:
     t_first_us: int = 0
     t_last_us: int = 0
     rates: Rates = field(default_factory=Rates)
+    silences: Silences = field(default_factory=Silences)
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), np.int64))
     """(H, W) events of each pixel."""
     motion: list[tuple[int, float]] = field(default_factory=list)
@@ -92,6 +97,7 @@ class Subject:
         """Measure the next packet."""
         self._tick(int(events.t_us[0]), int(events.t_us[-1]), len(events))
         self.rates.push(events.t_us)
+        self.silences.push(events.t_us)
         count_pixels([events], self.size, self.counts)
 
     def see_frame(self, t_us: int) -> None:
@@ -112,14 +118,21 @@ class Subject:
         )
 
     def smooth_activity(self) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """The activity every tenth of a second, each the mean over a second."""
+        """The activity every tenth of a second, each the mean over a second; NaN within that of a gap."""
         t_us, activity = self.activity()
         if len(t_us) < 2:
             return t_us, activity
         if self.kind == "frames":
             grid = np.arange(t_us[0], t_us[-1], BIN_US)
             t_us, activity = grid, np.interp(grid, t_us, activity)
-        return t_us, mean_around(activity, 500_000 // BIN_US)
+        smooth = mean_around(activity, REACH_US // BIN_US)
+        for start, end in zip(*self.gaps(), strict=True):
+            smooth[slice(*np.searchsorted(t_us, [start - REACH_US, end + REACH_US]))] = np.nan
+        return t_us, smooth
+
+    def gaps(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """(g,) starts and ends of the stretches in which events are missing, in microseconds."""
+        return self.silences.gaps(self.t_first_us, BIN_US, self.rates.laid_out()[1])
 
     def seconds(self, t_us: NDArray[np.int64] | int) -> NDArray[np.float64]:
         """Seconds since the first event or frame."""

@@ -1,10 +1,10 @@
 """Whether the clocks of the track and of the camera agree: events come faster the faster the car drives.
 
-The square root of the activity is fitted to that of the speed, at every shift of the track's times; the
-shift at which the fit is best is the offset. Its uncertainty is that of a block bootstrap (Kunsch, "The
-jackknife and the bootstrap for general stationary observations", Annals of Statistics 1989): stretches of
-BLOCK_S are drawn with replacement and the best shift is looked for anew. What the scene adds to the activity
-lasts for seconds, so single samples would make the offset seem much surer than it is.
+The logarithm of the activity is fitted to that of the speed, at every shift of the track's times; the shift
+at which the fit is best is the offset. Logarithms, because what the scene adds is a factor. The uncertainty
+is that of a block bootstrap (Kunsch, "The jackknife and the bootstrap for general stationary observations",
+Annals of Statistics 1989): stretches of BLOCK_S are drawn with replacement and the best shift is looked for
+anew. What the scene adds lasts for seconds, so single samples would make the offset seem much surer.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ DRAWS = 400
 """Draws of the bootstrap."""
 STEADY_MPS = 1.0
 """Spread of the speed (10th to 90th percentile) below which no offset shows."""
+STILL_MPS = 1.0
+"""Added to the speed (and as much to the activity) before the logarithm: below it, a track is noise."""
 LEAST_FIT = 0.3
 """Correlation below which events and speed have too little in common."""
 SUREST_S = 0.1
@@ -53,6 +55,11 @@ class Offset:
     fit: float
     """Correlation at the best shift."""
 
+    @property
+    def interval(self) -> tuple[float, float]:
+        """From and to, in seconds."""
+        return self.seconds - self.uncertainty_s, self.seconds + self.uncertainty_s
+
 
 class Check:
     """Asks the subject's activity and its track."""
@@ -71,11 +78,12 @@ class Check:
         found = Fit.of(t_us, activity, self._subject.track)
         if isinstance(found, str):
             return Outcome([_untold(found)])
+        offset = found.offset()
         curve = Curve(
             "offset", "Fit of the activity to the speed", "seconds added to the track's times", "correlation",
             found.shifts_s, found.correlation(np.ones(len(found.sums))),
+            [] if isinstance(offset, str) else [(*offset.interval, "offset, with 95 %")],
         )  # fmt: skip
-        offset = found.offset()
         return Outcome([_untold(offset) if isinstance(offset, str) else _finding(offset)], [curve])
 
 
@@ -86,7 +94,7 @@ class Fit:
     shifts_s: Floats
     """(S,) seconds added to the track's times."""
     sums: Floats
-    """(blocks, S, 6) n, x, y, xx, yy, xy: x from the speed, y from the activity."""
+    """(blocks, S, 6) n, x, y, xx, yy, xy: x is of the speed, y of the activity."""
 
     @classmethod
     def of(cls, t_us: NDArray[np.int64], activity: Floats, track: Track) -> Fit | str:
@@ -104,13 +112,13 @@ class Fit:
             return "the speed hardly changes"
         reach = round(min(REACH_S, used * BIN_US / 4e6) * 1e6 / BIN_US)
         shifts = np.arange(-reach, reach + 1)
-        y = np.sqrt(activity[:used])
-        y = (y - y.mean()) / max(float(y.std()), 1e-12)
-        sums = np.empty((blocks, len(shifts), 6))
-        for at, shift in enumerate(shifts):
-            x = np.sqrt(speed_at(track, at_us - shift * BIN_US, known))
-            sums[:, at] = _sums(x, y, blocks)
-        return cls(shifts * BIN_US / 1e6, sums)
+        wide_us = t_us[0] + np.arange(-reach, used + reach) * float(BIN_US)
+        x = np.log(speed_at(track, wide_us, known) + STILL_MPS)
+        still = np.nanmedian(activity) * STILL_MPS / max(float(np.nanmedian(here)), STILL_MPS)
+        y = np.log(activity[:used] + max(float(still), 1e-9))
+        y -= np.nanmean(y)
+        parts = [_sums(x[reach - shift : reach - shift + used], y, blocks) for shift in shifts]
+        return cls(shifts * BIN_US / 1e6, np.stack(parts, axis=1))
 
     def correlation(self, weights: Floats) -> Floats:
         """(S,) with each block counted `weights` (blocks,) times; 0 where half of the samples are missing."""
@@ -156,8 +164,8 @@ class Fit:
 
 
 def _sums(x: Floats, y: Floats, blocks: int) -> Floats:
-    """(blocks, 6) of the samples where x is known."""
-    known = np.isfinite(x)
+    """(blocks, 6) of the samples where both are known."""
+    known = np.isfinite(x) & np.isfinite(y)
     x, y = np.where(known, x, 0.0), np.where(known, y, 0.0)
     columns = np.stack([known.astype(np.float64), x, y, x * x, y * y, x * y], axis=1)
     return np.asarray(columns.reshape(blocks, -1, 6).sum(axis=1), np.float64)
@@ -176,5 +184,7 @@ def _finding(offset: Offset) -> Finding:
     if away <= max(HARMLESS_S, offset.uncertainty_s):
         return Finding("clock offset", "good", offset.seconds, "s", told)
     state: State = "look" if away - offset.uncertainty_s < 2 else "bad"
-    advice = f"open_track(..., offset_us={round(offset.seconds * 1e6)}), or set both clocks by GPS time"
+    advice = (
+        f"open_track(..., offset_us={round(offset.seconds * 100) * 10_000}), or set both clocks by GPS time"
+    )
     return Finding("clock offset", state, offset.seconds, "s", told, advice)

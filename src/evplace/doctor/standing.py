@@ -39,21 +39,30 @@ class Check:
     def outcome(self) -> Outcome:
         """Findings: quiet stretches, and stand-still where a track covers the recording."""
         t_us, activity = self._subject.smooth_activity()
-        if len(t_us) * BIN_US < 2 * SHORTEST_S * 1e6:
-            told = f"Cannot be told: the recording is shorter than {2 * SHORTEST_S:g} s."
+        if np.isfinite(activity).sum() * BIN_US < 2 * SHORTEST_S * 1e6:
+            told = f"Cannot be told: the recording has less than {2 * SHORTEST_S:g} s without gaps."
             return Outcome([Finding("quiet stretches", "unknown", None, "%", told)])
-        quiet = _long(activity <= LOW * np.percentile(activity, 90))
+        quiet = _long(activity <= LOW * np.nanpercentile(activity, 90))
         findings = [_finding("quiet stretches", quiet, self._subject, t_us, "the image hardly changes")]
         drawings = [
             _curve(
-                "activity", "Activity, mean over a second", self._unit(), self._subject, t_us, activity, quiet
+                "quiet",
+                "activity",
+                "Activity, mean over a second",
+                self._unit(),
+                self._subject,
+                t_us,
+                activity,
+                quiet,
             )
         ]
         mps = self._speed(t_us)
         if not np.isnan(mps).all():
             stands = _long(mps < SLOW_MPS)
             findings.append(_finding("stand-still", stands, self._subject, t_us, "the track stands still"))
-            drawings.append(_curve("speed", "Speed of the track", "m/s", self._subject, t_us, mps, stands))
+            drawings.append(
+                _curve("stands", "speed", "Speed of the track", "m/s", self._subject, t_us, mps, stands)
+            )
         return Outcome(findings, drawings)
 
     def _speed(self, t_us: NDArray[np.int64]) -> Floats:
@@ -71,6 +80,7 @@ def _long(where: NDArray[np.bool_]) -> Stretches:
 
 
 def _curve(
+    what: str,
     name: str,
     title: str,
     up: str,
@@ -80,7 +90,7 @@ def _curve(
     found: Stretches,
 ) -> Curve:
     seconds = subject.seconds(t_us)
-    spans = [(float(seconds[start]), float(seconds[stop - 1]), "stands") for start, stop in found]
+    spans = [(float(seconds[start]), float(seconds[stop - 1]), what) for start, stop in found]
     return Curve(name, title, "time in s", up, seconds, values, spans)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from evplace.cleaning import static_pixels
-from evplace.doctor._outcome import Finding, Outcome
+from evplace.doctor._outcome import Finding, Map, Outcome
 from evplace.doctor._subject import Subject
 from evplace.events import Events
 
@@ -15,6 +15,9 @@ ENOUGH = 5
 """Events of the median pixel below which a quiet region cannot be told from chance."""
 MUCH = 5.0
 """Per cent of the sensor above which masking is worth a look."""
+
+BLOCK = 0.8
+"""Share of static pixels in the rectangle around all of them that makes it one block."""
 
 
 class Check:
@@ -34,15 +37,20 @@ class Check:
             return Outcome([Finding("static regions", "unknown", None, "%", told)])
         static = static_pixels(counts)
         share = 100 * float(static.mean())
+        drawing = Map("static_regions", "Static regions", "1: static", static.astype(np.float64))
         told = f"{share:.1f} % of the sensor hardly ever see a change{_where(static)}."
         if share < MUCH:
-            return Outcome([Finding("static regions", "good", share, "%", told)])
+            return Outcome([Finding("static regions", "good", share, "%", told)], [drawing])
         advice = "--static-mask; a bonnet at the bottom can also be cut with --crop-bottom"
-        return Outcome([Finding("static regions", "look", share, "%", told, advice)])
+        return Outcome([Finding("static regions", "look", share, "%", told, advice)], [drawing])
 
 
 def _where(static: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> str:
+    """Rows and columns, where the regions make up one block."""
     if not static.any():
         return ""
     rows, columns = np.nonzero(static)
-    return f", in rows {rows.min()} to {rows.max()}, columns {columns.min()} to {columns.max()}"
+    top, bottom, left, right = rows.min(), rows.max(), columns.min(), columns.max()
+    if static[top : bottom + 1, left : right + 1].mean() < BLOCK:
+        return ", in several places"
+    return f", in rows {top} to {bottom}, columns {left} to {right}"
