@@ -92,5 +92,5 @@ class Examination:
         return sum(finding.state == state for finding in self.findings)
 
     def named(self, name: str) -> Finding:
-        """The finding of that name."""
-        return next(finding for finding in self.findings if finding.name == name)
+        """The finding of that name; KeyError where there is none."""
+        return {finding.name: finding for finding in self.findings}[name]

@@ -1,4 +1,4 @@
-"""How fast the camera moved, from its positions."""
+"""How fast the camera moved and turned, from its positions."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ BASE_US = 1_000_000
 """Speed is taken over about this long: over less, noise of a metre is more than the movement."""
 REACH_US = 3_000_000
 """Not over longer than this: that is a gap."""
+SHORTEST_M = 2.0
+"""A turn is not taken from steps shorter than this: noise would turn them."""
 
 
 def speeds(track: Track) -> tuple[NDArray[np.int64], Floats]:
@@ -36,4 +38,26 @@ def speed_at(track: Track, t_us: Floats, known: tuple[NDArray[np.int64], Floats]
     found = np.interp(t_us, at_us, mps, left=np.nan, right=np.nan)
     after = np.clip(np.searchsorted(at_us, t_us), 1, len(at_us) - 1)
     found[at_us[after] - at_us[after - 1] > REACH_US] = np.nan
+    return found
+
+
+def turning_at(track: Track, t_us: Floats) -> Floats:
+    """Radians a second at the times `t_us` (m,): between the way of the second before and of that after.
+
+    0 where it is not known, or the way is too short to have a direction.
+    """
+    before, here, after = (_position(track, t_us + shift) for shift in (-BASE_US, 0, BASE_US))
+    a, b = here - before, after - here
+    angle = np.abs(np.arctan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])) / (BASE_US / 1e6)
+    told = np.minimum(np.hypot(*a), np.hypot(*b)) >= SHORTEST_M  # False where NaN
+    return np.where(told, angle, 0.0)
+
+
+def _position(track: Track, t_us: Floats) -> Floats:
+    """(2, m) metres, linear between fixes; NaN beyond the track and in its gaps."""
+    at_us, xy = track.t_us[track.known], track.xy[track.known]
+    after = np.clip(np.searchsorted(at_us, t_us), 1, max(len(at_us) - 1, 1))
+    far = np.diff(at_us, append=at_us[-1:])[after - 1] > REACH_US
+    found = np.stack([np.interp(t_us, at_us, metres, left=np.nan, right=np.nan) for metres in xy.T])
+    found[:, far] = np.nan
     return found

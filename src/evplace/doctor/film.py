@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.doctor._outcome import Curve, Finding, Outcome, State
+from evplace.doctor._outcome import Curve, Finding, Outcome, State, counted
 from evplace.doctor._subject import Subject
 from evplace.simulators.motion import TOO_FAST, Frame, image_motion
 
@@ -20,7 +20,7 @@ class Check:
         self._before: Frame | None = None
         self._t_us: list[int] = []
         self._pixels: list[float] = []
-        self._same = 0
+        self._same = self._odd = 0
 
     def see(self, part: tuple[int, Frame]) -> None:
         """Compare the next frame with the one before."""
@@ -31,32 +31,44 @@ class Check:
             self._pixels.append(motion)
             self._subject.motion.append((self._t_us[-1] + span_us // 2, motion / max(span_us, 1) * 1e6))
             self._same += int(motion == 0.0 and np.array_equal(self._before, frame))
+        elif self._before is not None:
+            self._odd += 1
         self._before = frame
         self._t_us.append(t_us)
 
     def outcome(self) -> Outcome:
         """Findings: frames, frame times, repeated frames, image motion; the motion as a curve."""
-        t_us, pixels = np.array(self._t_us, np.int64), np.array(self._pixels)
-        if len(pixels) < 1:
+        pixels = np.array(self._pixels)
+        if not len(pixels):
             told = "Fewer than two frames of one size: no events can come of them."
-            return Outcome([Finding("frames", "bad", len(t_us), "frames", told, "give the whole film")])
-        steps = np.diff(t_us)
+            return Outcome([Finding("frames", "bad", len(self._t_us), "frames", told, "give the whole film")])
+        times = np.array(self._t_us, np.int64)
+        steps = times[1:] - times[:-1]
         fps = 1e6 / float(np.median(steps))
         findings = [
+            _sizes(self._odd, len(self._t_us)),
             _times(steps, fps, self._subject.timed),
             _repeated(self._same, len(pixels)),
             _motion(pixels, fps),
         ]
+        t_us = np.array([t_us for t_us, _ in self._subject.motion], np.int64)
         curve = Curve(
             "motion", "Motion of the image", "time in s", "pixels from one frame to the next",
-            self._subject.seconds(t_us[1 : len(pixels) + 1]), pixels,
+            self._subject.seconds(t_us), pixels,
         )  # fmt: skip
         return Outcome(findings, [curve])
 
 
+def _sizes(odd: int, frames: int) -> Finding:
+    if not odd:
+        return Finding("frames", "good", frames, "frames", "All frames are of one size.")
+    told = f"The size of the frames changes {counted(odd, 'time', 'times')}: no sensor does that."
+    return Finding("frames", "bad", frames, "frames", told, "bring all frames to one size")
+
+
 def _times(steps: NDArray[np.int64], fps: float, timed: bool) -> Finding:
     late = int(np.sum(steps > 1.5 * np.median(steps)))
-    told = f"{len(steps) + 1:,} frames, {fps:.1f} a second; {late} come late."
+    told = f"{len(steps) + 1:,} frames, {fps:.1f} a second; {counted(late, 'comes', 'come')} late."
     if not timed:
         return Finding(
             "frame times", "look", fps, "frames/s", f"{told} The folder has no times: the rate is made up.",

@@ -1,4 +1,4 @@
-"""Whether the clocks of the track and of the camera agree: events come faster the faster the car drives.
+"""Whether the clocks of the track and of the camera agree: the faster a car drives or turns, the more events.
 
 The logarithm of the activity is fitted to that of the speed, at every shift of the track's times; the shift
 at which the fit is best is the offset. Logarithms, because what the scene adds is a factor. The uncertainty
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.doctor._outcome import Curve, Finding, Outcome, State
-from evplace.doctor._speed import speed_at, speeds
+from evplace.doctor._speed import speed_at, speeds, turning_at
 from evplace.doctor._subject import BIN_US, Subject
 from evplace.tracks import Track
 
@@ -35,10 +35,13 @@ STEADY_MPS = 1.0
 """Spread of the speed (10th to 90th percentile) below which no offset shows."""
 STILL_MPS = 1.0
 """Added to the speed (and as much to the activity) before the logarithm: below it, a track is noise."""
+DEPTH_M = 10.0
+"""A turn moves the image as passing things at this distance does: it counts as their speed."""
 LEAST_FIT = 0.3
 """Correlation below which events and speed have too little in common."""
-SUREST_S = 0.1
-"""The uncertainty is never stated below a bin."""
+MODEL_S = 0.3
+"""What the model itself may be wrong by, as the camera sees ahead of the car: drives of the virtual city,
+whose clocks agree, give 0.2 s. It is added to the bootstrap's uncertainty, by squares."""
 VAGUE_S = 3.0
 """Uncertainty above which the offset is not told: it would not say which place is which."""
 HARMLESS_S = 0.5
@@ -81,7 +84,7 @@ class Check:
         offset = found.offset()
         curve = Curve(
             "offset", "Fit of the activity to the speed", "seconds added to the track's times", "correlation",
-            found.shifts_s, found.correlation(np.ones(len(found.sums))),
+            found.shifts_s, found.correlation(found.every)[0],
             [] if isinstance(offset, str) else [(*offset.interval, "offset, with 95 %")],
         )  # fmt: skip
         return Outcome([_untold(offset) if isinstance(offset, str) else _finding(offset)], [curve])
@@ -113,7 +116,7 @@ class Fit:
         reach = round(min(REACH_S, used * BIN_US / 4e6) * 1e6 / BIN_US)
         shifts = np.arange(-reach, reach + 1)
         wide_us = t_us[0] + np.arange(-reach, used + reach) * float(BIN_US)
-        x = np.log(speed_at(track, wide_us, known) + STILL_MPS)
+        x = np.log(speed_at(track, wide_us, known) + DEPTH_M * turning_at(track, wide_us) + STILL_MPS)
         still = np.nanmedian(activity) * STILL_MPS / max(float(np.nanmedian(here)), STILL_MPS)
         y = np.log(activity[:used] + max(float(still), 1e-9))
         y -= np.nanmean(y)
@@ -121,46 +124,58 @@ class Fit:
         return cls(shifts * BIN_US / 1e6, np.stack(parts, axis=1))
 
     def correlation(self, weights: Floats) -> Floats:
-        """(S,) with each block counted `weights` (blocks,) times; 0 where half of the samples are missing."""
-        n, x, y, xx, yy, xy = np.tensordot(weights, self.sums, 1).T
-        enough = n >= 0.5 * max(float(n.max()), 1.0)
-        n = np.maximum(n, 1)
-        spread = np.maximum(xx - x * x / n, 0) * np.maximum(yy - y * y / n, 0)
-        return np.where(
-            enough & (spread > 0), (xy - x * y / n) / np.sqrt(np.where(spread > 0, spread, 1)), 0.0
-        )
+        """(draws, S) with each block counted `weights` (draws, blocks) times.
 
-    def best(self, weights: Floats) -> float:
-        """The best shift in seconds, between two tried ones by a parabola."""
+        0 where half of the samples are missing.
+        """
+        n, x, y, xx, yy, xy = np.moveaxis(np.tensordot(weights, self.sums, 1), -1, 0)
+        enough = n >= 0.5 * np.maximum(n.max(axis=1, keepdims=True), 1.0)
+        n = np.maximum(n, 1.0)
+        spread = np.maximum(xx - x * x / n, 0) * np.maximum(yy - y * y / n, 0)
+        good = enough & (spread > 0)
+        return np.where(good, (xy - x * y / n) / np.sqrt(np.where(good, spread, 1.0)), 0.0)
+
+    def best(self, weights: Floats) -> Floats:
+        """(draws,) the best shifts in seconds, between two tried ones by a parabola."""
         fit = self.correlation(weights)
-        at = int(np.argmax(fit))
-        if at in (0, len(fit) - 1):
-            return float(self.shifts_s[at])
-        left, top, right = fit[at - 1 : at + 2]
-        bend = left - 2 * top + right
-        return float(self.shifts_s[at] + (0.5 * (left - right) / bend if bend < 0 else 0.0) * BIN_US / 1e6)
+        top = np.argmax(fit, axis=1)
+        inner = np.clip(top, 1, fit.shape[1] - 2)
+        left, middle, right = (fit[np.arange(len(fit)), inner + step] for step in (-1, 0, 1))
+        bend = left - 2 * middle + right
+        bent = (inner == top) & (bend < 0)
+        part = np.where(bent, 0.5 * (left - right) / np.where(bent, bend, 1.0), 0.0)
+        return np.asarray(self.shifts_s[top] + part * BIN_US / 1e6, np.float64)
+
+    @property
+    def every(self) -> Floats:
+        """(1, blocks) each block once."""
+        return np.ones((1, len(self.sums)))
 
     def offset(self) -> Offset | str:
         """The offset with its uncertainty; where it cannot be told, the reason why."""
-        every = np.ones(len(self.sums))
-        fit = float(self.correlation(every).max())
+        fit = float(self.correlation(self.every).max())
         if fit < LEAST_FIT:
             return f"events and speed have too little in common (correlation {fit:.2f})"
-        best = self.best(every)
+        best = float(self.best(self.every)[0])
         if abs(best) > float(self.shifts_s[-1]) - 0.5:
             return f"no offset within {float(self.shifts_s[-1]):.0f} s fits"
-        rng = np.random.default_rng(0)
         blocks = len(self.sums)
-        drawn = np.array(
-            [
-                self.best(np.bincount(rng.integers(0, blocks, blocks), minlength=blocks).astype(np.float64))
-                for _ in range(DRAWS)
-            ]
-        )
+        drawn = self.best(_draws(blocks))
         away = float(np.percentile(np.abs(drawn - best), 95)) * float(np.sqrt(blocks / (blocks - 1)))
         if away > VAGUE_S:
             return f"several offsets fit about as well (95 % of the draws lie within {away:.1f} s)"
-        return Offset(best, max(away, SUREST_S), fit)
+        return Offset(best, float(np.hypot(away, MODEL_S)), fit)
+
+
+def _draws(blocks: int) -> Floats:
+    """(DRAWS, blocks) how often each block is drawn, with replacement; always the same draws."""
+    chosen = np.random.default_rng(0).integers(0, blocks, (DRAWS, blocks))
+    rows = np.arange(DRAWS)[:, None] * blocks
+    return (
+        np.bincount((rows + chosen).ravel(), minlength=DRAWS * blocks)
+        .reshape(DRAWS, blocks)
+        .astype(np.float64)
+    )
 
 
 def _sums(x: Floats, y: Floats, blocks: int) -> Floats:

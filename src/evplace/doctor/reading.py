@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from evplace.doctor._outcome import Finding, Outcome, State
 from evplace.doctor._subject import Subject
-from evplace.events import Events
 
-OF = ("events",)
+OF = ("events", "frames")
 
 CLOCKS_BITS = (16, 24, 28, 30, 31, 32, 34)
 """Widths of clocks that cameras and files have, in bits of microseconds."""
@@ -18,13 +17,14 @@ class Check:
     def __init__(self, subject: Subject) -> None:
         self._subject = subject
 
-    def see(self, events: Events) -> None:
+    def see(self, part: object) -> None:
         """Nothing: the recording keeps count."""
 
     def outcome(self) -> Outcome:
-        """Findings: reading, remarks, the reasons for drops, clock."""
+        """Findings: reading; for a recording also remarks, the reasons for drops, clock."""
         recording = self._subject.recording
-        assert recording is not None
+        if recording is None:
+            return Outcome([_read(self._subject.fault)])
         dropped = recording.dropped
         total = self._subject.parts + sum(dropped.values())
         return Outcome(
@@ -53,10 +53,10 @@ class Check:
 
 def _read(fault: str | None) -> Finding:
     if fault is None:
-        return Finding("reading", "good", None, "", "The file was read to its end.")
+        return Finding("reading", "good", None, "", "It was read to its end.")
     return Finding(
         "reading", "bad", None, "",
-        f"The file breaks off: {fault}. Its good part was examined.",
+        f"It breaks off: {fault}. Its good part was examined.",
         "copy it from the camera again; every command works with the good part and then exits with 3",
     )  # fmt: skip
 
