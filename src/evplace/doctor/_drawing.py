@@ -65,7 +65,7 @@ def _map(figure: Any, axes: Any, drawing: Map) -> None:
     rows, columns = drawing.values.shape
     side = drawing.pixels
     shown = axes.imshow(
-        drawing.values, cmap="viridis", interpolation="nearest",
+        drawing.values, cmap="viridis", interpolation="nearest", vmin=0, vmax=drawing.top,
         extent=(-0.5, columns * side - 0.5, rows * side - 0.5, -0.5),
     )  # fmt: skip
     axes.plot(*drawing.marks.T, "o", markerfacecolor="none", markeredgecolor=MARK, markersize=7)

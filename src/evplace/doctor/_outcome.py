@@ -65,6 +65,8 @@ class Map:
     """(n, 2) column and row of what is to be circled."""
     pixels: int = 1
     """Side of a region in pixels."""
+    top: float | None = None
+    """The value at the top of the colours; None: the largest there is."""
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,7 @@ class Subject:
         if len(t_us) < 2:
             return t_us, activity
         if self.kind == "frames":
-            grid = np.arange(t_us[0], t_us[-1], BIN_US)
+            grid = np.arange(t_us[0], min(t_us[-1], t_us[0] + _LONGEST * BIN_US), BIN_US)
             t_us, activity = grid, np.interp(grid, t_us, activity)
         smooth = mean_around(activity, REACH_US // BIN_US)
         for start, end in zip(*self.gaps(), strict=True):

@@ -47,6 +47,7 @@ class Check:
             "0: none, 1: all events",
             np.where(known, best, np.nan),
             pixels=self._meter.region,
+            top=1,
         )
         return Outcome([_finding(beats, events)], [drawing])
 

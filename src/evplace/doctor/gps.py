@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.doctor._outcome import Finding, Outcome, State, counted
-from evplace.doctor._subject import BIN_US, Subject, mean_around
+from evplace.doctor._subject import Subject, mean_around
 from evplace.tracks import Track
 
 OF = ("events", "frames")
@@ -110,11 +110,10 @@ def _repeated(track: Track) -> Finding:
 
 def _covered(subject: Subject, track: Track) -> Finding:
     """Asked every tenth of a second, as long as the recording runs."""
-    t_us, _ = subject.activity()
+    t_us, _ = subject.smooth_activity()
     if not len(t_us):
         return Finding("GPS coverage", "unknown", None, "%", "Cannot be told: the recording holds nothing.")
-    grid = t_us if subject.kind == "events" else np.arange(subject.t_first_us, subject.t_last_us + 1, BIN_US)
-    share = 100 * float(track.at(grid).known.mean())
+    share = 100 * float(track.at(t_us).known.mean())
     if track.t_us[-1] < subject.t_first_us or track.t_us[0] > subject.t_last_us:
         return Finding(
             "GPS coverage", "bad", 0.0, "%",

@@ -37,7 +37,7 @@ class Check:
             return Outcome([Finding("static regions", "unknown", None, "%", told)])
         static = static_pixels(counts)
         share = 100 * float(static.mean())
-        drawing = Map("static_regions", "Static regions", "1: static", static.astype(np.float64))
+        drawing = Map("static_regions", "Static regions", "1: static", static.astype(np.float64), top=1)
         told = f"{share:.1f} % of the sensor hardly ever see a change{_where(static)}."
         if share < MUCH:
             return Outcome([Finding("static regions", "good", share, "%", told)], [drawing])
