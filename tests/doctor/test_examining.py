@@ -12,7 +12,7 @@ from examined import SIZE, noise, outcome, road
 from conftest import make_drive, write_drive
 from evplace import plugs
 from evplace.doctor import STATES, Examination, as_json, draw, examine
-from evplace.errors import InputError, OutputError, SettingsError
+from evplace.errors import InputError, OutputError, SettingsError, TrackError
 from evplace.events import Events
 from evplace.writers import write_recording
 
@@ -104,6 +104,17 @@ def test_what_cannot_be_examined(tmp_path: Path) -> None:
             examine(path)
     with pytest.raises(InputError, match=r"none\.nmea"):
         examine(recording, tmp_path / "none.nmea")
+
+
+def test_a_track_with_unknown_positions_is_its_known_ones(tmp_path: Path) -> None:
+    recording, _ = write_drive(tmp_path, "day", make_drive(windows=300))
+    whole = road(np.arange(0, 10.5, 0.5), 2 * np.arange(0, 10.5, 0.5))
+    asked = whole.at(np.arange(-3_000_000, 13_000_000, 250_000))
+    assert not asked.known.all()
+    by_log, by_asking = (examine(recording, track).named("GPS coverage") for track in (whole, asked))
+    assert by_log == by_asking
+    with pytest.raises(TrackError, match="no fix"):
+        examine(recording, whole.at([-5, -4]))
 
 
 def test_pictures(tmp_path: Path) -> None:

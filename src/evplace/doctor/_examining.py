@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from evplace import plugs
 from evplace.doctor._outcome import STATES, Examination, Finding, Outcome
 from evplace.doctor._subject import Subject
-from evplace.errors import DamagedRecordingError, InputError
+from evplace.errors import DamagedRecordingError, InputError, TrackError
 from evplace.events import Events, Size
 from evplace.frames import is_frames, open_frames
 from evplace.readers import open_recording
@@ -48,11 +49,21 @@ def examine(
     of no length.
     """
     windows = WindowSettings(dt)
-    positions = open_track(track) if isinstance(track, str | Path) else track
+    positions = _known(open_track(track) if isinstance(track, str | Path) else track)
     if _is_film(Path(path)):
         return _film(open_film(path, fps), windows, positions)
     recording = open_recording(path, size, time_unit=time_unit)
     return _examined(Subject(recording.path, "events", recording.size, windows, positions, recording))
+
+
+def _known(track: Track | None) -> Track | None:
+    """Only the fixes that have a position: a track that was asked at other times has some without."""
+    if track is None or track.known.all():
+        return track
+    if not track.known.any():
+        raise TrackError("no fix of the track has a position: give the log of this drive")
+    per_fix = ("t_us", "latitude", "longitude", "easting", "northing", "heading_deg")
+    return replace(track, **{name: getattr(track, name)[track.known] for name in per_fix})
 
 
 def _is_film(path: Path) -> bool:

@@ -19,7 +19,7 @@ SHORTEST_M = 2.0
 
 def speeds(track: Track) -> tuple[NDArray[np.int64], Floats]:
     """(n,) times in microseconds and (n,) metres a second, between each fix and the first a second later."""
-    t_us, xy = track.t_us[track.known], track.xy[track.known]
+    t_us, xy = track.t_us, track.xy
     later = np.searchsorted(t_us, t_us + BASE_US)
     first = np.flatnonzero(later < len(t_us))
     later = later[first]
@@ -55,7 +55,7 @@ def turning_at(track: Track, t_us: Floats) -> Floats:
 
 def _position(track: Track, t_us: Floats) -> Floats:
     """(2, m) metres, linear between fixes; NaN beyond the track and in its gaps."""
-    at_us, xy = track.t_us[track.known], track.xy[track.known]
+    at_us, xy = track.t_us, track.xy
     after = np.clip(np.searchsorted(at_us, t_us), 1, max(len(at_us) - 1, 1))
     far = np.diff(at_us, append=at_us[-1:])[after - 1] > REACH_US
     found = np.stack([np.interp(t_us, at_us, metres, left=np.nan, right=np.nan) for metres in xy.T])

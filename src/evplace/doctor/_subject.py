@@ -68,6 +68,7 @@ class Subject:
     windows: WindowSettings
     """The windows whose share without events is asked."""
     track: Track | None = None
+    """Each fix with a position."""
     recording: Recording | None = None
     """None for a film."""
     timed: bool = True

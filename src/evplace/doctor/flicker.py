@@ -44,7 +44,7 @@ class Check:
         drawing = Map(
             "flicker",
             "Flicker: agreement with the strongest beat of the mains",
-            "0: none, 1: all events",
+            "0: none, 1: all events; white: too few",
             np.where(known, best, np.nan),
             pixels=self._meter.region,
             top=1,
