@@ -60,19 +60,19 @@ def told(fit: Fit | str) -> Offset | None:
 
 
 def test_the_stated_uncertainty_covers_the_truth() -> None:
-    """95 % is stated; of 30 drives, chance leaves fewer than 26 covered in two cases of a hundred."""
-    cases = [case(seed) for seed in range(30)]
+    """95 % is stated; of 20 drives, chance leaves fewer than 17 covered in two cases of a hundred."""
+    cases = [case(seed) for seed in range(20)]
     offsets = [(true_s, told(fit)) for true_s, fit in cases]
     sure = [(true_s, found) for true_s, found in offsets if found is not None]
-    assert len(sure) >= 24
+    assert len(sure) >= 16
     covered = [abs(found.seconds - true_s) <= found.uncertainty_s for true_s, found in sure]
-    assert np.mean(covered) >= 26 / 30
+    assert np.mean(covered) >= 17 / 20
     assert np.median([found.uncertainty_s for _, found in sure]) < 1.0
     assert np.median([abs(found.seconds - true_s) for true_s, found in sure]) < 0.25
 
 
 def test_of_unrelated_drives_hardly_any_offset_is_told() -> None:
-    assert sum(told(case(seed, 150, related=False)[1]) is not None for seed in range(20)) <= 1
+    assert sum(told(case(seed, 150, related=False)[1]) is not None for seed in range(12)) <= 1
 
 
 def test_a_longer_recording_is_surer() -> None:

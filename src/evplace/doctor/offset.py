@@ -29,7 +29,7 @@ BLOCK_S = 10.0
 """Length of a block of the bootstrap."""
 FEWEST = 6
 """Blocks without which nothing can be told: a minute."""
-DRAWS = 400
+DRAWS = 200
 """Draws of the bootstrap."""
 STEADY_MPS = 1.0
 """Spread of the speed (10th to 90th percentile) below which no offset shows."""
