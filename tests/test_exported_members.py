@@ -10,9 +10,10 @@ from pathlib import Path
 import evplace
 
 PUBLIC = [
-    "Events", "EvplaceError", "ImageSettings", "Localizer", "Match", "PlaceGrid", "PlaceMap", "PlaceRuns",
-    "Recording", "Result", "Track", "TrainSettings", "Traverse", "WindowSettings", "__version__", "compare",
-    "evaluate", "event_image", "open_recording", "open_track", "open_traverse", "train",
+    "CleaningSettings", "Events", "EvplaceError", "ImageSettings", "Localizer", "Match", "PlaceGrid",
+    "PlaceMap", "PlaceRuns", "Recording", "Result", "SpacingSettings", "Track", "TrainSettings",
+    "Traverse", "WindowSettings", "__version__", "compare", "evaluate", "event_image", "open_recording",
+    "open_track", "open_traverse", "train",
 ]  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and type checkers; a test holds this list against the one below
     from evplace.capture import open_traverse as open_traverse
+    from evplace.cleaning import CleaningSettings as CleaningSettings
     from evplace.errors import EvplaceError as EvplaceError
     from evplace.evaluation import Result as Result
     from evplace.evaluation import compare as compare
@@ -20,6 +21,7 @@ if TYPE_CHECKING:  # for editors and type checkers; a test holds this list again
     from evplace.places import PlaceRuns as PlaceRuns
     from evplace.readers import Recording as Recording
     from evplace.readers import open_recording as open_recording
+    from evplace.spacing import SpacingSettings as SpacingSettings
     from evplace.tracks import Track as Track
     from evplace.tracks import open_track as open_track
     from evplace.training import TrainSettings as TrainSettings
@@ -31,6 +33,7 @@ if TYPE_CHECKING:  # for editors and type checkers; a test holds this list again
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "CleaningSettings": "evplace.cleaning",
     "Events": "evplace.events",
     "EvplaceError": "evplace.errors",
     "ImageSettings": "evplace.images",
@@ -41,6 +44,7 @@ _PUBLIC = {
     "PlaceRuns": "evplace.places",
     "Recording": "evplace.readers",
     "Result": "evplace.evaluation",
+    "SpacingSettings": "evplace.spacing",
     "Track": "evplace.tracks",
     "TrainSettings": "evplace.training",
     "Traverse": "evplace.traverse",

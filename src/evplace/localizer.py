@@ -1,6 +1,6 @@
 """The whole method on one screen: events in, matches out.
 
-    events -> window -> event image -> score row -> matcher's step -> Match
+    events -> cleaned -> window -> event image -> score row -> matcher's step -> Match
 
 Files, live cameras and evaluation all go this way; the size of the packets changes nothing.
 """
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace import settings
+from evplace.cleaning import CleaningSettings, MaskSource, read_mask
 from evplace.errors import PlaceMapError, RecordingError
 from evplace.events import Events
 from evplace.images import ImageSettings
@@ -54,15 +55,20 @@ class Localizer:
         place_map: PlaceMap,
         matcher: str = "local",
         preset: str | None = None,
+        mask: MaskSource | None = None,
         **matcher_settings: object,
     ) -> None:
         """For one map, with a matcher by name, one of its presets, and its settings.
 
-        Raises SettingsError for an unknown matcher, preset or setting.
+        Events are cleaned as those of the map were. Which pixels are hot belongs to the drive, so a map that
+        was learned without hot pixels needs the drive's own `mask` (see `evplace.cleaning.read_mask`, and
+        `pixel_mask` to measure it). Raises SettingsError for an unknown matcher, preset or setting.
         """
         self.map = place_map
         self.scorer = open_scorer(place_map)
         self._recipe = (matcher, preset, matcher_settings)
+        self.mask = mask
+        """Pixels of the drive to leave out; it counts from the first packet of a drive."""
         self.reset()
 
     @property
@@ -70,6 +76,11 @@ class Localizer:
         """The resolved settings of the matcher, with its name."""
         name, preset, values = self._recipe
         return {"name": name} | resolved_settings(name, preset, **values)
+
+    @property
+    def cleaning(self) -> CleaningSettings:
+        """How the map's events were cleaned, and so are those of a drive."""
+        return settings.make(CleaningSettings, self.map.settings.get("cleaning") or {})
 
     def reset(self) -> None:
         """Forget the drive so far."""
@@ -115,18 +126,19 @@ class Localizer:
             )
         return self.scorer.rows(images)
 
-    def path(self, traverse: Traverse) -> tuple[Path, Rows]:
+    def path(self, traverse: Traverse, rows: Rows | None = None) -> tuple[Path, Rows]:
         """A whole traverse in hindsight: one answer an image, and the score rows (n, items).
 
-        Images without events are answered with -1, and their rows are zero. This localizer forgets what it
-        had seen before.
+        Images without events are answered with -1, and their rows are zero. `rows` are what another
+        localizer of this map gave for this traverse, so that they need not be scored again. This localizer
+        forgets what it had seen before.
         """
         self.reset()
         filled = np.flatnonzero(traverse.counts != 0)
-        rows = np.zeros((len(traverse), len(self.map.items)), np.float32)
-        rows[filled] = self.rows(np.asarray(traverse.images[filled]))
-        for row in rows[filled]:
-            self._matcher.step(row)
+        if rows is None:
+            rows = np.zeros((len(traverse), len(self.map.items)), np.float32)
+            rows[filled] = self.rows(np.asarray(traverse.images[filled]))
+        self._matcher.extend(rows[filled])
         found = self._matcher.path()
         item = np.full(len(traverse), -1, np.int64)
         score = np.full(len(traverse), np.nan)
@@ -160,7 +172,8 @@ class Localizer:
             )
         windows = settings.make(WindowSettings, self.map.settings["windows"])
         images = settings.make(ImageSettings, self.map.settings["images"])
-        return EventImages(events.size, windows, images)
+        mask = None if self.mask is None else read_mask(self.mask, events.size)
+        return EventImages(events.size, windows, images, self.cleaning, mask)
 
 
 def _no_events(t_us: int) -> Match:

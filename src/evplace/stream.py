@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.cleaning import Cleaner, CleaningSettings, Mask
 from evplace.events import Events, Size
 from evplace.images import Imager, ImageSettings
 from evplace.windows import Window, WindowSettings, open_windows
@@ -23,21 +24,29 @@ class EventImage(NamedTuple):
 
 
 class EventImages:
-    """Cuts a stream of events into windows and makes an image of each; packet sizes change nothing."""
+    """Cleans a stream of events, cuts it into windows and makes images; packet sizes change nothing."""
 
     def __init__(
         self,
         size: Size,
         windows: WindowSettings | None = None,
         images: ImageSettings | None = None,
+        cleaning: CleaningSettings | None = None,
+        mask: Mask | None = None,
     ) -> None:
-        """For a sensor of `size` (width, height) in pixels."""
+        """For a sensor of `size` (width, height) in pixels; `mask` (H, W) is True at pixels to leave out."""
+        self._cleaner = Cleaner(size, cleaning, mask)
         self._windows = open_windows(windows or WindowSettings())
         self._imager = Imager(size, images)
 
+    @property
+    def cleaned(self) -> dict[str, int]:
+        """Reason -> events left out by the cleaning so far."""
+        return self._cleaner.dropped
+
     def push(self, events: Events) -> Iterator[EventImage]:
         """The images of all windows that `events` bring to their end."""
-        for piece, window in self._windows.push(events):
+        for piece, window in self._windows.push(self._cleaner.push(events)):
             self._imager.add(piece)
             if window is not None:
                 yield EventImage(self._imager.image(window.t_us), window)
@@ -56,7 +65,11 @@ def event_images(
     images: ImageSettings | None = None,
 ) -> Iterator[EventImage]:
     """The images of a whole recording, one after another, in bounded memory."""
-    stream = EventImages(size, windows, images)
+    yield from images_of(packets, EventImages(size, windows, images))
+
+
+def images_of(packets: Iterable[Events], stream: EventImages) -> Iterator[EventImage]:
+    """The images that `stream` makes of all `packets`."""
     for events in packets:
         yield from stream.push(events)
     yield from stream.finish()

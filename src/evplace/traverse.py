@@ -1,7 +1,7 @@
 """A traverse: the images of one drive with their times and, where there is GPS, positions.
 
-On disk it is a folder of plain arrays: images.npy, t_us.npy, counts.npy, track.npy and traverse.json; images
-are memory-mapped, so a traverse may be larger than memory.
+On disk it is a folder of plain arrays: images.npy, t_us.npy, counts.npy, track.npy, mask.npy and
+traverse.json; images are memory-mapped, so a traverse may be larger than memory.
 """
 
 from __future__ import annotations
@@ -36,6 +36,8 @@ class Traverse:
     """Where each image was taken, NaN where there is no fix; None without GPS."""
     info: dict[str, Any] = field(default_factory=dict)
     """Where it comes from: source, sensor, the settings of windows and images, what was dropped."""
+    mask: NDArray[np.bool_] | None = None
+    """(H, W) True at the sensor's pixels whose events were left out; None where all were taken."""
 
     def __post_init__(self) -> None:
         if not len(self.images):
@@ -51,7 +53,7 @@ class Traverse:
     def __getitem__(self, part: slice) -> Traverse:
         """A stretch of the drive; images stay views."""
         track = self.track.at(self.t_us[part]) if self.track is not None else None
-        return Traverse(self.images[part], self.t_us[part], self.counts[part], track, self.info)
+        return Traverse(self.images[part], self.t_us[part], self.counts[part], track, self.info, self.mask)
 
     @property
     def xy(self) -> NDArray[np.float64]:
@@ -63,7 +65,7 @@ class Traverse:
         with new_traverse(path, self.info, overwrite) as writer:
             for image, t_us, count in zip(self.images, self.t_us, self.counts, strict=True):
                 writer.add(image, int(t_us), int(count))
-            writer.track = self.track
+            writer.track, writer.mask = self.track, self.mask
 
     @classmethod
     def load(cls, path: str | Path) -> Traverse:
@@ -79,11 +81,13 @@ class Traverse:
             t_us = read_array(folder / "t_us.npy", f"the traverse {folder}")
             counts = read_array(folder / "counts.npy", f"the traverse {folder}")
             track = _load_track(folder, t_us, info.get("track"))
+            masked = (folder / "mask.npy").exists()
+            mask = read_array(folder / "mask.npy", f"the traverse {folder}") if masked else None
         except TraverseError:
             raise
         except InputError as error:
             raise TraverseError(str(error)) from error
-        return cls(images, t_us, counts, track, info["info"])
+        return cls(images, t_us, counts, track, info["info"], mask)
 
 
 class TraverseWriter:
@@ -93,6 +97,8 @@ class TraverseWriter:
         """Write into `folder`, which exists; see `new_traverse`."""
         self.track: Track | None = None
         """Where each image was taken: set it before the end."""
+        self.mask: NDArray[np.bool_] | None = None
+        """(H, W) True at the pixels whose events were left out."""
         self.info = dict(info)
         """Saved at the end."""
         self.t_us: list[int] = []
@@ -116,6 +122,8 @@ class TraverseWriter:
         self._images.close()
         np.save(self._folder / "t_us.npy", np.array(self.t_us, np.int64))
         np.save(self._folder / "counts.npy", np.array(self._counts, np.int64))
+        if self.mask is not None:
+            np.save(self._folder / "mask.npy", self.mask)
         zone = None
         if self.track is not None:
             _save_track(self._folder, self.track)

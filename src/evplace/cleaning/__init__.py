@@ -1,24 +1,35 @@
 """Events that say nothing of the place: hot pixels, static regions, too quick repeats, flickering lamps.
 
-First measure: `count_pixels` and `FlickerMeter` run over a whole recording, `hot_pixels` and
-`static_pixels` make masks of the counts. Then clean: `without`, `Refractory` and `FlickerFilter` take one
-packet after the other; the size of the packets changes nothing.
+`CleaningSettings` say what is left out, `pixel_mask` measures where hot and static pixels are, and `Cleaner`
+does it, one packet after the other: it stands before the windows, for files and live streams alike. Its parts
+can be used alone: `count_pixels` and `FlickerMeter` run over a whole recording, `hot_pixels` and
+`static_pixels` make masks of the counts, `without`, `Refractory` and `FlickerFilter` clean. The size of the
+packets changes nothing.
 
 The rules and their numbers are ours: the paper does not clean.
 """
 
 from __future__ import annotations
 
+from evplace.cleaning._cleaner import Cleaner
 from evplace.cleaning._flicker import MAINS_HZ, FlickerFilter, FlickerMeter
-from evplace.cleaning._pixels import Refractory, count_pixels, hot_pixels, static_pixels, without
+from evplace.cleaning._mask import MaskSource, pixel_mask, read_mask
+from evplace.cleaning._pixels import Mask, Refractory, count_pixels, hot_pixels, static_pixels, without
+from evplace.cleaning._settings import CleaningSettings
 
 __all__ = [
     "MAINS_HZ",
+    "Cleaner",
+    "CleaningSettings",
     "FlickerFilter",
     "FlickerMeter",
+    "Mask",
+    "MaskSource",
     "Refractory",
     "count_pixels",
     "hot_pixels",
+    "pixel_mask",
+    "read_mask",
     "static_pixels",
     "without",
 ]

@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -43,6 +44,16 @@ def print_facts(title: str, facts: Mapping[str, object]) -> None:
 def note(text: str) -> None:
     """A remark beside the answer: on standard error."""
     print(f"evplace: {text}", file=sys.stderr)
+
+
+@contextlib.contextmanager
+def remarks() -> Iterator[None]:
+    """Warnings within the block as remarks, once it ends well."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for remark in caught:
+        note(str(remark.message))
 
 
 @contextlib.contextmanager

@@ -58,6 +58,8 @@ class Args:
     """A preset of the matcher, for example paper."""
     set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """A setting of the matcher, as name=value."""
+    mask: Path | None = None
+    """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
     scores: bool = False
     """Keep the score rows in the result."""
     size: tuple[int, int] | None = None
@@ -75,8 +77,9 @@ def run(args: Args) -> int:
     if args.out.exists() and not args.overwrite:
         raise OutputError(f"{args.out} exists: choose another name, remove it, or add --overwrite")
     place_map = PlaceMap.load(args.map)
-    where = Localizer(place_map, args.matcher, args.preset, **settings.from_pairs(args.set))
-    query = _opened(args, place_map)
+    values = settings.from_pairs(args.set)
+    where = Localizer(place_map, args.matcher, args.preset, args.mask, **values)
+    query = _opened(args, where)
     result = evaluate(where, query, _truth(args, place_map, query), args.rule)
     result.save(args.out, args.overwrite, args.scores)
     if args.json:
@@ -89,11 +92,14 @@ def run(args: Args) -> int:
     return 0
 
 
-def _opened(args: Args, place_map: PlaceMap) -> Traverse:
-    """The query, its images made as the map's were."""
-    windows = settings.make(WindowSettings, place_map.settings.get("windows") or {})
-    images = settings.make(ImageSettings, place_map.settings.get("images") or {})
-    return open_traverse(args.drive, args.track, windows, images, args.size, args.time_unit)
+def _opened(args: Args, where: Localizer) -> Traverse:
+    """The query, its images made as the map's were: of events, or the camera's own."""
+    windows = settings.make(WindowSettings, where.map.settings.get("windows") or {})
+    images = settings.make(ImageSettings, where.map.settings.get("images") or {})
+    return open_traverse(
+        args.drive, args.track, windows, images, args.size, args.time_unit, where.cleaning,
+        mask=where.mask, kind=where.map.settings.get("input"),
+    )  # fmt: skip
 
 
 def _truth(args: Args, place_map: PlaceMap, query: Traverse) -> Truth | None:

@@ -4,6 +4,7 @@ Examples:
   evplace localize campus.evp night.aedat4                     a line a window
   evplace localize campus.evp night.aedat4 -o night.csv
   evplace localize campus.evp night --matcher seqslam --set ds=20
+  evplace localize campus.evp night.aedat4 --mask night_hot_pixels.txt
   evplace localize campus.evp night.aedat4 --json              a JSON object a line
 """
 
@@ -21,6 +22,7 @@ from typing import Annotated, Literal
 import tyro
 
 from evplace import settings
+from evplace.cleaning import pixel_mask
 from evplace.cli._output import USED_GOOD_PART, note
 from evplace.errors import DamagedRecordingError
 from evplace.localizer import Localizer, Match
@@ -48,6 +50,8 @@ class Args:
     """A setting of the matcher, as name=value: K=5, tau1=0.99, tau2=0.01 for local."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Write a .csv file instead of standard output."""
+    mask: Path | None = None
+    """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
     size: tuple[int, int] | None = None
     """Width and height of the sensor in pixels, where the file does not say."""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
@@ -70,6 +74,8 @@ class _Drive:
             yield from self._where.match_traverse(Traverse.load(self._args.drive))
             return
         recording = open_recording(self._args.drive, self._args.size, time_unit=self._args.time_unit)
+        where = self._where
+        where.mask = pixel_mask(recording.packets(), recording.size, where.cleaning, where.mask)
         try:
             for events in recording.packets():
                 yield from self._where.push(events)
@@ -80,7 +86,8 @@ class _Drive:
 
 def run(args: Args) -> int:
     """Localise and print, or write, the matches."""
-    where = Localizer(PlaceMap.load(args.map), args.matcher, args.preset, **settings.from_pairs(args.set))
+    values = settings.from_pairs(args.set)
+    where = Localizer(PlaceMap.load(args.map), args.matcher, args.preset, args.mask, **values)
     matches = _Drive(where, args)
     if args.out is not None:
         with (

@@ -2,6 +2,7 @@
 
 Examples:
   evplace train day.aedat4 --track day.nmea -o campus.evp            places of 20 m, the network
+  evplace train day.aedat4 --track day.nmea -o campus.evp --mask-hot later drives are cleaned like it
   evplace train day -o campus.evp --preset paper --seed 1            day is a traverse folder
   evplace train day -o campus.evp --scorer ncc --set sigma=2         no training: images are the map
   evplace train day -o campus.evp --run-length 10                    no GPS: ten images are a place
@@ -20,11 +21,13 @@ import tyro
 
 from evplace import settings as settings_room
 from evplace.capture import open_traverse
+from evplace.cleaning import CleaningSettings
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json, progress
 from evplace.errors import OutputError, TraverseError
 from evplace.images import ImageSettings
 from evplace.places import PlaceGrid, PlaceRuns, Places
 from evplace.scorers import checked_settings
+from evplace.spacing import SpacingSettings
 from evplace.training import PRESETS, TrainSettings, train
 from evplace.traverse import Traverse
 from evplace.windows import WindowSettings
@@ -55,8 +58,12 @@ class Args:
     train: Annotated[TrainSettings, tyro.conf.arg(name="")] = field(default_factory=TrainSettings)
     windows: Annotated[WindowSettings, tyro.conf.arg(name="")] = field(default_factory=WindowSettings)
     images: Annotated[ImageSettings, tyro.conf.arg(name="")] = field(default_factory=ImageSettings)
+    cleaning: Annotated[CleaningSettings, tyro.conf.arg(name="")] = field(default_factory=CleaningSettings)
+    spacing: Annotated[SpacingSettings, tyro.conf.arg(name="")] = field(default_factory=SpacingSettings)
+    mask: Path | None = None
+    """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
     settings: Path | None = None
-    """A TOML file with any of these settings; train, windows and images are its tables."""
+    """A TOML file with any of these settings; train, windows, images, cleaning and spacing are its tables."""
     size: tuple[int, int] | None = None
     """Width and height of the sensor in pixels, where the file does not say."""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
@@ -72,7 +79,10 @@ def run(args: Args) -> int:
     if args.out.exists() and not args.overwrite:  # said before the training, not after it
         raise OutputError(f"{args.out} exists: choose another name, remove it, or add --overwrite")
     scorer_settings = checked_settings(args.scorer, settings_room.from_pairs(args.set))
-    day = open_traverse(args.drive, args.track, args.windows, args.images, args.size, args.time_unit)
+    day = open_traverse(
+        args.drive, args.track, args.windows, args.images, args.size, args.time_unit,
+        args.cleaning, args.spacing, args.mask,
+    )  # fmt: skip
     places = _places(args, day)
     began = time.monotonic()
     with progress("training") as show:

@@ -12,15 +12,12 @@ from evplace.doctor._outcome import STATES, Examination, Finding, Outcome
 from evplace.doctor._subject import Subject
 from evplace.errors import DamagedRecordingError, InputError, TrackError
 from evplace.events import Events, Size
-from evplace.frames import is_frames, open_frames
+from evplace.frames import is_frames
 from evplace.readers import open_recording
-from evplace.simulators.frames import Film, open_film
+from evplace.simulators.frames import VIDEOS, Film, open_film
 from evplace.simulators.motion import Frame
 from evplace.tracks import Track, open_track
 from evplace.windows import WindowSettings
-
-FILMS = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm")
-"""Suffixes of video files."""
 
 
 class Check(Protocol):
@@ -69,12 +66,11 @@ def _known(track: Track | None) -> Track | None:
 def _is_film(path: Path) -> bool:
     if path.is_dir():
         return is_frames(path) or is_frames(path / "images")
-    return path.suffix.lower() in FILMS
+    return path.suffix.lower() in VIDEOS
 
 
 def _film(film: Film, windows: WindowSettings, track: Track | None) -> Examination:
-    timed = not film.path.is_dir() or open_frames(film.path, fps=film.fps).timed
-    return _examined(Subject(film.path, "frames", film.size, windows, track, timed=timed), film)
+    return _examined(Subject(film.path, "frames", film.size, windows, track, timed=film.timed), film)
 
 
 def _examined(subject: Subject, film: Film | None = None) -> Examination:

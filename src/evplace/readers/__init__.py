@@ -24,7 +24,7 @@ from evplace.events import Size
 from evplace.readers._recording import Recording
 from evplace.readers._source import Block, Hints, Source
 
-__all__ = ["Block", "Hints", "Recording", "Source", "open_recording"]
+__all__ = ["Block", "Hints", "Recording", "Source", "is_recording", "open_recording"]
 
 HEAD = 1 << 16
 """Bytes from which the format is told."""
@@ -53,6 +53,15 @@ def open_recording(
     except OSError as error:
         raise RecordingError(f"cannot read {file} as {name}: {error.strerror or error}") from error
     return Recording(file, name, source, size)
+
+
+def is_recording(path: Path) -> bool:
+    """Whether the content of the file or folder `path` is of a known recording format."""
+    try:
+        _found(path, _head(path))
+    except RecordingError:
+        return False
+    return True
 
 
 def _head(path: Path) -> bytes:
