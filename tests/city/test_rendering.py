@@ -14,7 +14,7 @@ from evplace.city.mesh import OVAL, SPHERE, Mesh, Primitives
 from evplace.city.raster import Buffers, View, draw, sample_offset
 from evplace.city.signals import RED_S
 from evplace.city.town import Town
-from evplace.simulators.esim import image_motion
+from evplace.simulators.motion import image_motion
 
 SIZE = (64, 48)
 VIEW = View((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), 20.0, 32, 24)

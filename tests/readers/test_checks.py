@@ -83,3 +83,8 @@ def test_a_recording_where_every_other_time_is_wrong_is_judged_in_time() -> None
     good, _, counts = checked(block(t_us), SIZE, 0, final=True)
     assert len(good.t_us) + sum(counts) == 1_000_000
     assert np.all(np.diff(good.t_us) >= 0)
+
+
+def test_how_far_back_dropped_events_lay() -> None:
+    good, _, counts = checked(block([10, 500, 480, 490, 100, 600]), SIZE, NOTHING_YET, final=True)
+    assert (good.back_us, drops(counts)) == (400, {"backwards": 3})

@@ -11,6 +11,7 @@ from made import MAKERS, evt3_words, some_events
 from evplace.events import Events
 from evplace.readers import open_recording
 from evplace.readers._clock import clock, unwrap, unwrap_32
+from evplace.writers import write_recording
 
 MASK = 0xFFF
 
@@ -73,3 +74,14 @@ def test_files_longer_than_their_clock(form: str, tmp_path: Path) -> None:
         path.write_bytes(b"% evt 2.0\n% geometry 240x180\n% end\n" + words)
     back = Events.concatenate(list(open_recording(path).packets()))
     assert np.array_equal(back.t_us - back.t_us[0], events.t_us - events.t_us[0])
+
+
+@pytest.mark.parametrize("turns", [0, 1, 3])
+def test_turns_of_the_clock_are_counted(tmp_path: Path, turns: int) -> None:
+    t_us = np.arange(0, turns * (1 << 24) + 9_000_000, 500_000) + 4_000_000
+    zeros = np.zeros(len(t_us))
+    write_recording(tmp_path / "a.raw", [Events.of(t_us, zeros, zeros, zeros, (64, 48))], (64, 48))
+    recording = open_recording(tmp_path / "a.raw")
+    assert recording.wraps == 0
+    assert sum(len(packet) for packet in recording.packets()) == len(t_us)
+    assert recording.wraps == turns

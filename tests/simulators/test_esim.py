@@ -217,13 +217,6 @@ def blob(at: float) -> NDArray[np.float32]:
     return (0.05 + np.exp(-((x - at) ** 2 + (y - 24.0) ** 2) / 60.0)).astype(np.float32)
 
 
-def test_motion_is_measured_in_pixels() -> None:
-    for pixels in (0.25, 0.5, 1.0):
-        assert esim.image_motion(blob(30), blob(30 + pixels)) == pytest.approx(pixels, rel=0.45)
-    assert esim.image_motion(blob(20), blob(34)) > 2.0
-    assert esim.image_motion(blob(30), blob(30)) == 0.0
-
-
 def test_too_few_frames_a_second_are_warned_of_once() -> None:
     fast = [(10_000 * k, blob(5.0 + 6.0 * k)) for k in range(9)]
     with pytest.warns(UserWarning, match="pixels from frame 1") as caught:

@@ -16,7 +16,7 @@ MAINS_HZ = (50, 60, 100, 120, 200, 240)
 """Where lamps flicker: mains of 50 and 60 Hz, twice that, and one harmonic."""
 
 _PHASES = 256
-"""Steps of a full turn in the flicker meter's table."""
+"""Steps of a full turn in the flicker meter's table: 8 bits."""
 
 _MIN_PAIRS = 1000
 """Below this the flicker of a region is not known: chance alone gives 1 / sqrt(pairs)."""
@@ -46,16 +46,19 @@ class FlickerMeter:
                 f"are impossible: frequencies are whole numbers above {beside} Hz for such a window"
             )
         self.size, self.region, self.window_us = size, region, window_us
-        self._teeth = np.array([[f, f - beside, f + beside] for f in frequencies_hz], np.int64).ravel()
+        teeth = [tooth for f in frequencies_hz for tooth in (f, f - beside, f + beside)]
+        self._turns = np.array([-(-(tooth << 64) // 1_000_000) for tooth in teeth], np.uint64)
         self._grid = (-(-size[1] // region), -(-size[0] // region))
         regions = self._grid[0] * self._grid[1]
-        self._sums = np.zeros((regions, len(self._teeth), 2))
+        self._row = np.arange(size[1]) // region * self._grid[1]
+        self._column = np.arange(size[0]) // region
+        self._sums = np.zeros((regions, 2, len(teeth)))
         self._events = np.zeros(regions, np.int64)
-        self._power = np.zeros((regions, len(self._teeth)))
+        self._power = np.zeros((regions, len(teeth)))
         self._pairs = np.zeros(regions)
         self._start_us = np.full(1, np.iinfo(np.int64).min)
         turn = np.arange(_PHASES) * (2 * np.pi / _PHASES)
-        self._table = np.column_stack([np.cos(turn), np.sin(turn)])
+        self._table = np.stack([np.cos(turn), np.sin(turn)])
 
     def push(self, events: Events) -> None:
         """Take the next packet."""
@@ -63,9 +66,13 @@ class FlickerMeter:
         if len(events) and self._start_us[0] == np.iinfo(np.int64).min:
             self._start_us[0] = events.t_us[0]
         _beat(
-            events.t_us, events.x, events.y, events.p, self.region, self._grid[1], self.window_us,
-            self._teeth, self._table, self._start_us, self._sums, self._events, self._power, self._pairs,
+            events.t_us, events.x, events.y, events.p, self._row, self._column, self.window_us,
+            self._turns, self._table, self._start_us, self._sums, self._events, self._power, self._pairs,
         )  # fmt: skip
+
+    def pairs(self) -> NDArray[np.float64]:
+        """(region rows, region columns) pairs of events compared: chance alone gives 1 / sqrt(pairs)."""
+        return self._pairs.reshape(self._grid).copy()
 
     def strengths(self) -> NDArray[np.float64]:
         """(region rows, region columns, frequencies) 0 to 1, over all complete windows.
@@ -125,10 +132,10 @@ def _beat(
     x: NDArray[np.uint16],
     y: NDArray[np.uint16],
     p: Mask,
-    region: int,
-    columns: int,
+    row: Counts,
+    column: Counts,
     window_us: int,
-    teeth: Counts,
+    turns: NDArray[np.uint64],
     table: NDArray[np.float64],
     start_us: Counts,
     sums: NDArray[np.float64],
@@ -136,25 +143,30 @@ def _beat(
     power: NDArray[np.float64],
     pairs: NDArray[np.float64],
 ) -> None:
-    """Sum signed phases in the window from start_us[0]; a complete window goes to power and pairs."""
+    """Sum signed phases in the window from start_us[0]; a complete window goes to power and pairs.
+
+    `turns` are turns a microsecond, in 64 bits behind the point: products keep their fraction alone, and its
+    8 highest bits are the step of the table. `row` + `column` is the region.
+    """
     for i in range(len(t_us)):
         if t_us[i] - start_us[0] >= window_us:
             for place in range(len(events)):
                 n = events[place]
                 pairs[place] += n * (n - 1.0)
-                for k in range(len(teeth)):
-                    power[place, k] += sums[place, k, 0] ** 2 + sums[place, k, 1] ** 2 - n
+                for k in range(len(turns)):
+                    power[place, k] += sums[place, 0, k] ** 2 + sums[place, 1, k] ** 2 - n
             sums[:] = 0.0
             events[:] = 0
             start_us[0] += (t_us[i] - start_us[0]) // window_us * window_us
-        place = (y[i] // region) * columns + x[i] // region
+        place = row[y[i]] + column[x[i]]
         events[place] += 1
         sign = 1.0 if p[i] else -1.0
-        since = t_us[i] - start_us[0]
-        for k in range(len(teeth)):
-            phase = (since * teeth[k] * _PHASES // 1_000_000) % _PHASES
-            sums[place, k, 0] += sign * table[phase, 0]
-            sums[place, k, 1] += sign * table[phase, 1]
+        since = np.uint64(t_us[i] - start_us[0])
+        real, imaginary = sums[place, 0], sums[place, 1]
+        for k in range(len(turns)):
+            phase = (since * turns[k]) >> np.uint64(56)
+            real[k] += sign * table[0, phase]
+            imaginary[k] += sign * table[1, phase]
 
 
 @njit(cache=True)

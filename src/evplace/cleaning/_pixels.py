@@ -15,9 +15,12 @@ Counts = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
-def count_pixels(packets: Iterable[Events], size: Size) -> Counts:
-    """(H, W) events of each pixel over all packets of a sensor of `size` (width, height)."""
-    counts = np.zeros((size[1], size[0]), np.int64)
+def count_pixels(packets: Iterable[Events], size: Size, before: Counts | None = None) -> Counts:
+    """(H, W) events of each pixel over all packets of a sensor of `size` (width, height).
+
+    They are added to the counts `before`, in place, where these are given.
+    """
+    counts = np.zeros((size[1], size[0]), np.int64) if before is None else before
     for events in packets:
         check_size(events, size)
         _count(events.x, events.y, counts)

@@ -36,19 +36,20 @@ def checked(block: Block, size: Size, last_us: int, final: bool) -> tuple[Block,
     before more are seen are handed back, unless the block is `final`. Where nothing is dropped the arrays
     are passed on, not copied.
     """
-    t_us, x, y, p, untimed = block
+    t_us, x, y, p, untimed, _ = block
     start = _first_doubt(t_us, x, y, size[0], size[1], last_us)
     if start == len(t_us):
         return block, None, [0, 0, 0, untimed]
     keep = np.ones(len(t_us), np.bool_)
-    drops = np.zeros(3, np.int64)
-    decided = _sift(t_us, x, y, size[0], size[1], last_us, start, final, keep, drops)
+    drops, back_us = np.zeros(3, np.int64), np.zeros(1, np.int64)
+    decided = _sift(t_us, x, y, size[0], size[1], last_us, start, final, keep, drops, back_us)
     part = keep[:decided]
     kept = Block(
         _picked(t_us[:decided], part),
         _picked(x[:decided], part),
         _picked(y[:decided], part),
         _picked(p[:decided], part),
+        back_us=int(back_us[0]),
     )
     rest = Block(t_us[decided:], x[decided:], y[decided:], p[decided:]) if decided < len(t_us) else None
     return kept, rest, [*drops.tolist(), untimed]
@@ -89,8 +90,11 @@ def _sift(
     final: bool,
     keep: NDArray[np.bool_],
     drops: NDArray[np.int64],
+    back_us: NDArray[np.int64],
 ) -> int:
-    """Mark what is dropped in `keep`, count it in `drops`; return how many events are decided."""
+    """Mark what is dropped in `keep`, count it in `drops`, note the largest step back in `back_us`;
+    return how many events are decided.
+    """
     last = t_us[start - 1] if start > 0 else last_us
     fault_until, fault_us = 0, last_us  # up to here steps forward, to about this time, are known to be faults
     for i in range(start, len(t_us)):
@@ -102,6 +106,7 @@ def _sift(
         if last != NOTHING_YET and t < last:
             keep[i] = False
             drops[1] += 1
+            back_us[0] = max(back_us[0], last - t)
             continue
         if last == NOTHING_YET or t - JUMP_US > last:
             if i >= fault_until:

@@ -39,6 +39,8 @@ class Recording:
     """Events delivered so far; None before the first packet."""
     t_first_us: int | None
     t_last_us: int | None
+    back_us: int
+    """How far the furthest of the events dropped as backwards lay back."""
     notes: list[str]
     """Guesses that were made, one plain sentence each."""
 
@@ -73,11 +75,20 @@ class Recording:
         if fault is not None:
             raise fault
 
+    @property
+    def wraps(self) -> int:
+        """How often the file's clock started anew between the first and the last event delivered so far."""
+        turn_us, zero_us = self._source.turn_us, self._source.zero_us
+        if not turn_us or self.t_first_us is None or self.t_last_us is None:
+            return 0
+        return (self.t_last_us - zero_us) // turn_us - (self.t_first_us - zero_us) // turn_us
+
     def _kept(self, block: Block, final: bool) -> tuple[Block, Block | None]:
         last_us = NOTHING_YET if self.t_last_us is None else self.t_last_us
         good, held, drops = checked(block, self.size, last_us, final)
         for reason, count in zip(REASONS, drops, strict=True):
             self.dropped[reason] += count
+        self.back_us = max(self.back_us, good.back_us)
         return good, held
 
     def _delivered(self, block: Block) -> Iterator[Events]:
@@ -94,6 +105,7 @@ class Recording:
     def _forget(self) -> None:
         self.dropped = dict.fromkeys(REASONS, 0)
         self.events = self.t_first_us = self.t_last_us = None
+        self.back_us = 0
 
     def _decided_size(self, given: Size | None) -> Size:
         """The size given, else the header's, else the smallest usual one that holds the data."""

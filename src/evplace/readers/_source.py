@@ -31,6 +31,8 @@ class Block(NamedTuple):
     p: NDArray[np.bool_]
     untimed: int = 0
     """Events left out because no time had been given yet when they came."""
+    back_us: int = 0
+    """How far the furthest of the events that the checks left out as backwards lay back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +45,10 @@ class Source:
     """Starts reading anew; raises DamagedRecordingError at a fault, after every good block."""
     notes: list[str] = field(default_factory=list)
     """Guesses that were made, one plain sentence each."""
+    turn_us: int = 0
+    """Microseconds after which the file's clock starts anew, which `blocks` makes good; 0: it never does."""
+    zero_us: int = 0
+    """The time at which a clock that turns read 0."""
 
 
 def gathered(blocks: Iterator[Block], events: int = 1 << 17) -> Iterator[Block]:
@@ -72,4 +78,5 @@ def joined(blocks: list[Block]) -> Block:
         np.concatenate([block.y for block in blocks]),
         np.concatenate([block.p for block in blocks]),
         sum(block.untimed for block in blocks),
+        max(block.back_us for block in blocks),
     )

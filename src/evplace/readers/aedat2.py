@@ -57,7 +57,8 @@ def read(path: Path, hints: Hints) -> Source:
                 f"{path} names no known camera ('{name}'): give the size of one of {CAMERAS}"
             )
         notes.append(f"the header names no known camera: {camera} is taken for its size")
-    return Source(CAMERAS[camera], partial(_blocks, path, start, camera == "DVS128", CAMERAS[camera]), notes)
+    size = CAMERAS[camera]
+    return Source(size, partial(_blocks, path, start, camera == "DVS128", size), notes, turn_us=1 << 32)
 
 
 def _header(path: Path) -> tuple[bytes, int]:

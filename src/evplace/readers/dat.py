@@ -45,9 +45,9 @@ def read(path: Path, hints: Hints) -> Source:
     if version not in ("", "1", "2"):
         raise RecordingError(f"{path} is a DAT file of version '{version}': known are 1 and 2")
     notes = [] if version else ["the DAT header states no version: 2 is taken"]
-    return Source(
-        stated_size(fields), partial(_blocks, path, start + 2, version == "1", start_us(fields)), notes
-    )
+    zero_us = start_us(fields)
+    blocks = partial(_blocks, path, start + 2, version == "1", zero_us)
+    return Source(stated_size(fields), blocks, notes, 1 << 32, zero_us)
 
 
 def _blocks(path: Path, start: int, first_version: bool, shift_us: int) -> Iterator[Block]:

@@ -30,7 +30,9 @@ def matches(path: Path, head: bytes) -> bool:
 def read(path: Path, hints: Hints) -> Source:
     """The header; RecordingError where it states an impossible size."""
     fields, start = header(head_of(path))
-    return Source(stated_size(fields), partial(_blocks, path, start, start_us(fields)))
+    zero_us = start_us(fields)
+    blocks = partial(_blocks, path, start, zero_us)
+    return Source(stated_size(fields), blocks, turn_us=1 << 34, zero_us=zero_us)
 
 
 def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:

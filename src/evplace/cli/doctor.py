@@ -1,0 +1,98 @@
+"""Examine a recording, a video or a folder of images: what is wrong with it, and what to do.
+
+Examples:
+  evplace doctor night.aedat4
+  evplace doctor night.aedat4 --track night.nmea --dt 1/60      also the track and the two clocks
+  evplace doctor night.aedat4 --report night.doctor             a folder of pictures and findings.json
+  evplace doctor drive.mp4                                      are there enough frames to simulate from?
+  evplace doctor night.aedat4 --json                            one object: facts, findings, fault
+
+States: bad costs results; look may; unknown cannot be told from this recording; good needs nothing. Advice
+names flags of `evplace images`.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import tyro
+
+from evplace.cli._output import USED_GOOD_PART, note, print_json
+from evplace.doctor import STATES, Examination, Finding, as_json, draw, examine
+from evplace.errors import OutputError
+
+WIDTH = 110
+"""Columns of the text."""
+WORDS = {"bad": "bad", "look": "to look at", "unknown": "unknown", "good": "good"}
+"""State -> how the summary counts it."""
+
+
+@dataclass(frozen=True)
+class Args:
+    """Flags of `evplace doctor`."""
+
+    recording: tyro.conf.Positional[Path]
+    """An event recording, a video, or a folder of images."""
+    track: Path | None = None
+    """GPS log of the same drive: NMEA, GPX or csv."""
+    dt: str = "1/30"
+    """Length of a window in seconds, as a fraction or a decimal."""
+    size: tuple[int, int] | None = None
+    """Width and height of the sensor in pixels, where the file does not say or says it wrongly."""
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None
+    """Unit of the times, where the file does not say."""
+    fps: float = 30.0
+    """For a folder of images without timestamps.txt: images a second."""
+    report: Path | None = None
+    """Also write a folder of pictures and findings.json."""
+    overwrite: bool = False
+    """Replace the report if it exists."""
+    json: bool = False
+    """Print one JSON object."""
+
+
+def run(args: Args) -> int:
+    """Examine, print, and draw if asked."""
+    if args.report is not None and args.report.exists() and not args.overwrite:
+        raise OutputError(f"{args.report} exists: choose another name, remove it, or add --overwrite")
+    found = examine(args.recording, args.track, args.dt, args.size, args.time_unit, args.fps)
+    if args.report is not None:
+        draw(found, args.report, args.overwrite)
+    if args.json:
+        print_json(as_json(found))
+    else:
+        print("\n".join(_lines(found)))
+    if found.fault is not None:
+        note(f"{found.fault}; what came before it was examined")
+    return USED_GOOD_PART if found.fault is not None else 0
+
+
+def _lines(found: Examination) -> list[str]:
+    """The summary, then each finding, the worst first."""
+    numbers = [(found.count(state), WORDS[state]) for state in STATES]
+    counts = [f"{number} {word}" for number, word in numbers if number]
+    facts = found.facts
+    kind = facts["kind"]
+    what = f"{facts['width']} x {facts['height']}, {facts[kind]:,} {kind}"
+    if facts["t_first_us"] is not None:
+        what += f", {(facts['t_last_us'] - facts['t_first_us']) / 1e6:.3f} s"
+    lines = [f"{found.path}: {', '.join(counts)}", f"  {what}", ""]
+    width = max(len(finding.name) for finding in found.findings)
+    return lines + [line for finding in found.findings for line in _told(finding, width)]
+
+
+def _told(finding: Finding, width: int) -> list[str]:
+    head = f"  {finding.state:<7}  {finding.name:<{width}}  "
+    indent = " " * len(head)
+    lines = _wrapped(finding.sentence, head, indent)
+    if finding.advice:
+        lines += _wrapped(f"-> {finding.advice}", indent, indent + "   ")
+    return lines
+
+
+def _wrapped(text: str, first: str, other: str) -> list[str]:
+    """Lines of a text; flags are not broken at their hyphens."""
+    return textwrap.wrap(text, WIDTH, initial_indent=first, subsequent_indent=other, break_on_hyphens=False)

@@ -1,0 +1,129 @@
+"""One pass: each part of a recording is shown to every examination."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from evplace import plugs
+from evplace.doctor._outcome import STATES, Examination, Finding, Outcome
+from evplace.doctor._subject import Subject
+from evplace.errors import DamagedRecordingError, InputError, TrackError
+from evplace.events import Events, Size
+from evplace.frames import is_frames
+from evplace.readers import open_recording
+from evplace.simulators.frames import VIDEOS, Film, open_film
+from evplace.simulators.motion import Frame
+from evplace.tracks import Track, open_track
+from evplace.windows import WindowSettings
+
+
+class Check(Protocol):
+    """One examination of one subject."""
+
+    def see(self, part: Any) -> None:
+        """The next events, or the next frame as (t_us, image)."""
+
+    def outcome(self) -> Outcome:
+        """What was found."""
+
+
+def examine(
+    path: str | Path,
+    track: str | Path | Track | None = None,
+    dt: str = "1/30",
+    size: Size | None = None,
+    time_unit: str | None = None,
+    fps: float = 30.0,
+) -> Examination:
+    """Examine an event recording, a video or a folder of images, and its track.
+
+    `dt` is the length of a window in seconds, as of `WindowSettings`; `size` and `time_unit` are for
+    recordings that do not say (see `open_recording`), `fps` for folders of images without times. A damaged
+    recording's good part is examined. InputError where something cannot be read, SettingsError for a `dt`
+    of no length.
+    """
+    windows = WindowSettings(dt)
+    positions = _known(open_track(track) if isinstance(track, str | Path) else track)
+    if _is_film(Path(path)):
+        return _film(open_film(path, fps), windows, positions)
+    recording = open_recording(path, size, time_unit=time_unit)
+    return _examined(Subject(recording.path, "events", recording.size, windows, positions, recording))
+
+
+def _known(track: Track | None) -> Track | None:
+    """Only the fixes that have a position: a track that was asked at other times has some without."""
+    if track is None or track.known.all():
+        return track
+    if not track.known.any():
+        raise TrackError("no fix of the track has a position: give the log of this drive")
+    per_fix = ("t_us", "latitude", "longitude", "easting", "northing", "heading_deg")
+    return replace(track, **{name: getattr(track, name)[track.known] for name in per_fix})
+
+
+def _is_film(path: Path) -> bool:
+    if path.is_dir():
+        return is_frames(path) or is_frames(path / "images")
+    return path.suffix.lower() in VIDEOS
+
+
+def _film(film: Film, windows: WindowSettings, track: Track | None) -> Examination:
+    return _examined(Subject(film.path, "frames", film.size, windows, track, timed=film.timed), film)
+
+
+def _examined(subject: Subject, film: Film | None = None) -> Examination:
+    parts = [plugs.load("doctor", name) for name in plugs.names("doctor")]
+    checks: list[Check] = [part.Check(subject) for part in parts if subject.kind in part.OF]
+    for part in _events(subject) if film is None else _frames(subject, film):
+        for check in checks:
+            check.see(part)
+    outcomes = [check.outcome() for check in checks]
+    findings: list[Finding] = [finding for outcome in outcomes for finding in outcome.findings]
+    return Examination(
+        str(subject.path),
+        _facts(subject),
+        tuple(sorted(findings, key=lambda finding: STATES.index(finding.state))),
+        tuple(drawing for outcome in outcomes for drawing in outcome.drawings),
+        subject.fault,
+    )
+
+
+def _events(subject: Subject) -> Iterator[Events]:
+    """The good part's packets, each measured by the subject first."""
+    assert subject.recording is not None
+    try:
+        for events in subject.recording.packets():
+            if len(events):
+                subject.see_events(events)
+                yield events
+    except DamagedRecordingError as error:
+        subject.fault = str(error)
+
+
+def _frames(subject: Subject, film: Film) -> Iterator[tuple[int, Frame]]:
+    """The frames up to one that cannot be decoded."""
+    try:
+        for t_us, frame in film:
+            subject.see_frame(t_us)
+            yield t_us, frame
+    except InputError as error:
+        if not subject.parts:
+            raise
+        subject.fault = str(error)
+
+
+def _facts(subject: Subject) -> dict[str, Any]:
+    recording = subject.recording
+    facts: dict[str, Any] = {
+        "kind": subject.kind,
+        "width": subject.size[0],
+        "height": subject.size[1],
+        subject.kind: subject.parts,
+        "t_first_us": subject.t_first_us if subject.parts else None,
+        "t_last_us": subject.t_last_us if subject.parts else None,
+    }
+    if recording is None:
+        return facts
+    return facts | {"format": recording.format, "dropped": recording.dropped}

@@ -1,0 +1,40 @@
+"""Pixels that fire by themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evplace.cleaning import hot_pixels
+from evplace.doctor._outcome import Finding, Map, Outcome, State
+from evplace.doctor._subject import Subject
+from evplace.events import Events
+
+OF = ("events",)
+
+
+class Check:
+    """Asks the counts of the whole file."""
+
+    def __init__(self, subject: Subject) -> None:
+        self._subject = subject
+
+    def see(self, events: Events) -> None:
+        """Nothing: the subject counts."""
+
+    def outcome(self) -> Outcome:
+        """Finding: hot pixels, by their share of the events; a map of the counts with them circled."""
+        counts = self._subject.counts
+        hot = hot_pixels(counts)
+        number, share = int(hot.sum()), 100 * float(counts[hot].sum()) / max(float(counts.sum()), 1.0)
+        state: State = "good" if share < 1 else "look" if share < 10 else "bad"
+        told = f"{number:,} of {hot.size:,} pixels fire by themselves, with {share:.2f} % of the events."
+        advice = "" if state == "good" else "--mask-hot"
+        rows, columns = np.nonzero(hot)
+        drawing = Map(
+            "hot_pixels",
+            f"Events of each pixel; {number} hot ones circled",
+            "events, log10(1 + n)",
+            np.log10(1.0 + counts),
+            np.column_stack([columns, rows]).astype(np.float64),
+        )
+        return Outcome([Finding("hot pixels", state, share, "%", told, advice)], [drawing])

@@ -1,0 +1,56 @@
+"""Regions of the sensor that hardly ever see a change: the bonnet, a vignette."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evplace.cleaning import static_pixels
+from evplace.doctor._outcome import Finding, Map, Outcome
+from evplace.doctor._subject import Subject
+from evplace.events import Events
+
+OF = ("events",)
+
+ENOUGH = 5
+"""Events of the median pixel below which a quiet region cannot be told from chance."""
+MUCH = 5.0
+"""Per cent of the sensor above which masking is worth a look."""
+
+BLOCK = 0.8
+"""Share of static pixels in the rectangle around all of them that makes it one block."""
+
+
+class Check:
+    """Asks the counts of the whole file."""
+
+    def __init__(self, subject: Subject) -> None:
+        self._subject = subject
+
+    def see(self, events: Events) -> None:
+        """Nothing: the subject counts."""
+
+    def outcome(self) -> Outcome:
+        """Finding: static regions, by their share of the sensor."""
+        counts = self._subject.counts
+        if np.median(counts) < ENOUGH:
+            told = f"Cannot be told: half of the pixels have fewer than {ENOUGH} events; record longer."
+            return Outcome([Finding("static regions", "unknown", None, "%", told)])
+        static = static_pixels(counts)
+        share = 100 * float(static.mean())
+        drawing = Map("static_regions", "Static regions", "1: static", static.astype(np.float64), top=1)
+        told = f"{share:.1f} % of the sensor hardly ever see a change{_where(static)}."
+        if share < MUCH:
+            return Outcome([Finding("static regions", "good", share, "%", told)], [drawing])
+        advice = "--static-mask; a bonnet at the bottom can also be cut with --crop-bottom"
+        return Outcome([Finding("static regions", "look", share, "%", told, advice)], [drawing])
+
+
+def _where(static: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> str:
+    """Rows and columns, where the regions make up one block."""
+    if not static.any():
+        return ""
+    rows, columns = np.nonzero(static)
+    top, bottom, left, right = rows.min(), rows.max(), columns.min(), columns.max()
+    if static[top : bottom + 1, left : right + 1].mean() < BLOCK:
+        return ", in several places"
+    return f", in rows {top} to {bottom}, columns {left} to {right}"

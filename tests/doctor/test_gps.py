@@ -1,0 +1,77 @@
+"""The track: known gaps, jumps, drops and coverage."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from examined import SIZE, found, noise, outcome, road
+
+from evplace.doctor import gps
+from evplace.events import Events
+
+T_S = np.arange(0, 60.1, 0.5)
+EVENTS = noise(500, 60)
+
+
+def test_a_good_track_is_good() -> None:
+    findings = outcome(gps, EVENTS, road(T_S, 8 * T_S)).findings
+    assert [finding.state for finding in findings] == ["good"] * 5
+    assert all(not finding.advice for finding in findings)
+
+
+def test_without_a_track_nothing_is_said() -> None:
+    assert not outcome(gps, EVENTS).findings
+
+
+def test_a_gap_is_its_share_of_the_time() -> None:
+    t_s = T_S[(T_S < 20) | (T_S > 32)]
+    track = road(t_s, 8 * t_s)
+    gap = found(gps, EVENTS, "GPS gaps", track)
+    assert (gap.state, gap.value) == ("bad", pytest.approx(100 * 13 / 60, abs=0.01))
+    assert "1 step " in gap.sentence
+    covered = found(gps, EVENTS, "GPS coverage", track)
+    assert (covered.state, covered.value) == ("look", pytest.approx(100 * 47 / 60, abs=0.5))
+
+
+def test_steps_over_twenty_metres_have_no_position_inside() -> None:
+    t_s = np.arange(0, 61.0)
+    gap = found(gps, EVENTS, "GPS gaps", road(t_s, 25 * t_s))
+    assert (gap.state, gap.value) == ("bad", pytest.approx(100))
+
+
+@pytest.mark.parametrize("mps", [0.0, 3.0, 30.0])
+def test_a_jump_is_found_at_any_speed(mps: float) -> None:
+    metres = mps * T_S
+    assert found(gps, EVENTS, "GPS jumps", road(T_S, metres)).value == 0
+    metres[60:] += 150
+    jump = found(gps, EVENTS, "GPS jumps", road(T_S, metres))
+    assert (jump.state, jump.value) == ("look", 1)
+    assert f"{150 + mps / 2:,.0f} m in 0.5 s" in jump.sentence
+
+
+@pytest.mark.parametrize(("lost", "state"), [(0, "good"), (1, "good"), (20, "look"), (60, "bad")])
+def test_fixes_that_were_left_out(lost: int, state: str) -> None:
+    track = replace(road(T_S, 8 * T_S), dropped={"no fix": lost} if lost else {})
+    finding = found(gps, EVENTS, "GPS fixes", track)
+    assert (finding.state, finding.value) == (state, pytest.approx(100 * lost / (lost + len(T_S))))
+
+
+def test_a_log_faster_than_its_receiver_repeats_positions() -> None:
+    finding = found(gps, EVENTS, "GPS repeats", road(T_S, 8 * np.floor(T_S)))
+    assert (finding.state, finding.value) == ("look", pytest.approx(50, abs=3))
+    stands = np.where(T_S < 30, 8 * T_S, 240)
+    assert found(gps, EVENTS, "GPS repeats", road(T_S, stands)).state == "good"
+
+
+def test_a_track_of_another_day_does_not_overlap() -> None:
+    finding = found(gps, EVENTS, "GPS coverage", road(T_S + 5000, 8 * T_S))
+    assert (finding.state, finding.value) == ("bad", 0)
+    assert "do not overlap" in finding.sentence
+    assert "5000.000 s to 5060.000 s" in finding.sentence
+
+
+def test_one_fix_and_no_events() -> None:
+    assert found(gps, EVENTS, "GPS fixes", road(T_S[:1], T_S[:1])).state == "bad"
+    assert found(gps, Events.empty(SIZE), "GPS coverage", road(T_S, T_S)).state == "unknown"
