@@ -13,7 +13,7 @@ ROOMS = (
     "errors plugs storage settings events readers writers cleaning windows resampling representations images "
     "stream frames tracks places truth traverse sheets capture datasets simulators city placemap network "
     "network_onnx checkpoint training distances seqslam_images scorers matchers sweeps localizer evaluation "
-    "trial charts cli"
+    "trial charts report cli"
 ).split()
 """In the order of the data: a room imports only rooms before it, or files of its own."""
 
