@@ -1,0 +1,268 @@
+"""The tables of a page, as HTML that needs no script."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+from evplace.evaluation import Result
+from evplace.report._found import Ablation, Found, TableRow
+from evplace.report._html import Html, join, tag
+
+RULES = {
+    "places": "the paper's rule: the right cell or one of its eight neighbours",
+    "view": "the rule of views: also a reference near by that looks the same way",
+}
+"""Rule -> what it means."""
+OVERVIEW = {
+    "accuracy": "accuracy", "accuracy_seen": "seen only", "rejection_rate": "rejected",
+    "precision": "precision", "recall": "recall", "average_precision": "AP", "recall@1": "recall@1",
+    "chance": "chance",
+}  # fmt: skip
+"""Figure -> the head of its column, all of them in %."""
+VERDICTS = {"better": "▲", "worse": "▼"}
+BAR_PX = 60
+"""Half the width of an effect's bar."""
+
+
+def headline(found: Found) -> Html:
+    """The few figures that a person asks for first."""
+    return tag("div", *(_tile(*one) for one in _headline_figures(found)), class_="tiles")
+
+
+def table2(rows: Sequence[TableRow]) -> Html:
+    """The paper's Table 2: a block for each matcher, both rules, of which one is shown."""
+    rules = list(dict.fromkeys(row.rule for row in rows))
+    blocks = []
+    for number, rule in enumerate(rules):
+        of_rule = [row for row in rows if row.rule == rule]
+        matchers = dict.fromkeys(row.matcher for row in of_rule)
+        tables = [_block(matcher, [row for row in of_rule if row.matcher == matcher]) for matcher in matchers]
+        blocks.append(tag("div", *tables, class_="rule", data_rule=rule, hidden=number > 0))
+    return join(_rule_switch(rules), _legend(rows), *blocks)
+
+
+def ablations(rows: Sequence[Ablation]) -> Html:
+    """What each change did, from the best to the worst."""
+    ranked = sorted(rows, key=lambda row: -row.effect)
+    widest = max((abs(row.effect) for row in ranked), default=0) or 1
+    head = _head("change", "", "query", "accuracy", "effect in points", "", "verdict")
+    body = [
+        tag(
+            "tr",
+            tag("th", row.name, scope="row"),
+            tag("td", row.change),
+            tag("td", row.query),
+            _number(_with_spread(row.mean, row.spread)),
+            _number(_with_spread(row.effect, row.effect_spread, sign=True)),
+            tag("td", _bar(row.effect / widest), class_="bar"),
+            tag("td", f"{VERDICTS.get(row.verdict, '=')} {row.verdict}", class_=f"verdict {row.verdict}"),
+        )
+        for row in ranked
+    ]  # fmt: skip
+    return _scrolled(tag("table", head, tag("tbody", *body)))
+
+
+def overview(results: Mapping[str, Result]) -> Html:
+    """One row a result, in %."""
+    shown = [
+        key for key in OVERVIEW if any(result.figures.get(key) is not None for result in results.values())
+    ]
+    head = _head("result", "queries", *(OVERVIEW[key] for key in shown), "took")
+    body = [
+        tag(
+            "tr",
+            tag("th", name, scope="row"),
+            _number(f"{len(result.judged):,}"),
+            *(_number(percent(result.figures.get(key))) for key in shown),
+            _number("–" if result.took_s is None else f"{result.took_s:.3g} s"),
+        )
+        for name, result in results.items()
+    ]
+    return _scrolled(tag("table", head, tag("tbody", *body)))
+
+
+def facts(said: Mapping[str, Any]) -> Html:
+    """Names and values as they were saved; nested ones as in matcher.K."""
+    pairs = [
+        (key, value if isinstance(value, str) else json.dumps(value)) for key, value in flat(said).items()
+    ]
+    return tag("dl", *(join(tag("dt", key), tag("dd", value)) for key, value in pairs))
+
+
+def flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one, with dots in the names."""
+    found: dict[str, Any] = {}
+    for key, value in values.items():
+        found |= flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
+    return found
+
+
+def percent(share: float | None) -> str:
+    """A share as per cent with one decimal."""
+    return "–" if share is None else f"{100 * share:.1f}"
+
+
+def _headline_figures(found: Found) -> list[tuple[str, str, str]]:
+    """(value, what it is, remark) each."""
+    if found.table is not None and found.table.rows:
+        return _of_table(found.table.rows)
+    if found.results:
+        return _of_results(found.results)
+    if found.ablations is not None:
+        best = max(found.ablations.rows, key=lambda row: row.effect, default=None)
+        return [(f"{best.effect:+.1f} points", "the best change", best.name)] if best else []
+    return []
+
+
+def _of_table(rows: Sequence[TableRow]) -> list[tuple[str, str, str]]:
+    """The first input by the paper's own matcher beside the others, and how often it beats the second."""
+    of_rule = [row for row in rows if row.rule == rows[0].rule]
+    matchers = [row.matcher for row in of_rule]
+    matcher = "Algorithm 1" if "Algorithm 1" in matchers else matchers[0]
+    main, *others = dict.fromkeys(row.input for row in of_rule)
+    cases: dict[tuple[str, str, str], dict[str, TableRow]] = {}
+    for row in of_rule:  # of several sensors, the first
+        cases.setdefault((row.database, row.query, row.matcher), {}).setdefault(row.input, row)
+    tiles = []
+    for case in (case for key, case in cases.items() if key[2] == matcher and main in case):
+        row = case[main]
+        remarks = [f"{name} {case[name].mean:.1f}" for name in others if name in case]
+        remarks += [] if row.paper is None else [f"paper {row.paper:.1f}"]
+        value = f"{_with_spread(row.mean, row.spread)} %"
+        tiles.append((value, f"{row.query}, {main}, {matcher}", ", ".join(remarks)))
+    pairs = [case for case in cases.values() if others and {main, others[0]} <= set(case)]
+    if pairs:
+        wins = sum(case[main].mean > case[others[0]].mean for case in pairs)
+        words = f"{main} better than {others[0]}"
+        tiles.append((f"{wins} of {len(pairs)}", words, "over all queries and matchers"))
+    return tiles
+
+
+def _of_results(results: Mapping[str, Result]) -> list[tuple[str, str, str]]:
+    tiles = [] if len(results) == 1 else [(str(len(results)), "results", "")]
+    kinds = {"accuracy": "accuracy", "accuracy_seen": "accuracy on seen queries", "average_precision":
+             "average precision", "recall@1": "recall@1"}  # fmt: skip
+    for key, words in kinds.items():
+        known = {
+            name: result.figures[key]
+            for name, result in results.items()
+            if result.figures.get(key) is not None
+        }
+        if known:
+            best = max(known, key=lambda name: known[name])
+            tiles.append((f"{percent(known[best])} %", words, best if len(results) > 1 else ""))
+    return tiles
+
+
+def _tile(value: str, words: str, remark: str) -> Html:
+    return tag("div", tag("strong", value), tag("span", words), tag("small", remark), class_="tile")
+
+
+def _rule_switch(rules: Sequence[str]) -> Html | None:
+    if len(rules) < 2:
+        return None
+    buttons = [
+        tag("button", rule, type="button", data_shows=rule, aria_pressed="false" if number else "true",
+            title=RULES.get(rule))
+        for number, rule in enumerate(rules)
+    ]  # fmt: skip
+    return tag("div", tag("span", "Right by"), *buttons, class_="switch", role="group", aria_label="Rule")
+
+
+def _legend(rows: Sequence[TableRow]) -> Html:
+    seeds = sorted({int(row.seeds) for row in rows if row.seeds is not None})
+    counted = f" over {seeds[0]} seeds" if len(seeds) == 1 and seeds[0] > 1 else " over seeds"
+    spread = f", ± their spread{counted}" if any(row.spread is not None for row in rows) else ""
+    return tag(
+        "p",
+        f"Accuracy in %{spread}; beside it the paper's figure. Below: accuracy on the queries that the map "
+        "has seen, and the share rejected as not seen before.",
+        class_="note",
+    )
+
+
+def _block(matcher: str, rows: Sequence[TableRow]) -> Html:
+    """A matcher's table: a row for each database and query, columns for each input and sensor."""
+    kinds = list(dict.fromkeys((row.input, row.sensor) for row in rows))
+    inputs = [name for name, _ in kinds]
+    printed = {
+        kind
+        for kind in kinds
+        if any(row.paper is not None for row in rows if (row.input, row.sensor) == kind)
+    }
+    chance = any(row.chance is not None for row in rows)
+    heads = [
+        tag("th", name, tag("small", sensor) if inputs.count(name) > 1 else None, scope="colgroup",
+            colspan=1 + ((name, sensor) in printed))
+        for name, sensor in kinds
+    ]  # fmt: skip
+    top = tag("tr", *(tag("th", word, scope="col", rowspan=2) for word in ("database", "query")), *heads,
+              tag("th", "chance", scope="col", rowspan=2) if chance else None)  # fmt: skip
+    under = [
+        join(tag("th", "ours", scope="col"), tag("th", "paper", scope="col") if kind in printed else None)
+        for kind in kinds
+    ]
+    body = []
+    for (database, query), group in groupby(
+        sorted(rows, key=_order(rows)), key=lambda row: (row.database, row.query)
+    ):
+        of_kind = {(row.input, row.sensor): row for row in group}
+        cells = [_cells(of_kind.get(kind), kind in printed) for kind in kinds]
+        known = [row.chance for row in of_kind.values() if row.chance is not None]
+        last = _number(_one(known[0] if known else None)) if chance else None
+        body.append(tag("tr", tag("td", database), tag("th", query, scope="row"), *cells, last))
+    table = tag("table", tag("caption", matcher), tag("thead", top, tag("tr", *under)), tag("tbody", *body))
+    return _scrolled(table)
+
+
+def _order(rows: Sequence[TableRow]) -> Any:
+    """Sorts rows by the first appearance of their database and query."""
+    places = {
+        key: number for number, key in enumerate(dict.fromkeys((row.database, row.query) for row in rows))
+    }
+    return lambda row: places[row.database, row.query]
+
+
+def _cells(row: TableRow | None, with_paper: bool) -> Html:
+    if row is None:
+        return join(_number("–"), _number("–") if with_paper else None)
+    beside = [f"seen {_one(row.seen)}"] if row.seen is not None else []
+    beside += [f"rejected {_one(row.rejected)}"] if row.rejected is not None else []
+    ours = tag(
+        "td", tag("b", _with_spread(row.mean, row.spread)), tag("small", ", ".join(beside)), class_="number"
+    )
+    return join(ours, _number(_one(row.paper), "number paper") if with_paper else None)
+
+
+def _bar(share: float) -> Html:
+    """A bar to the right of the middle for a gain, to the left for a loss."""
+    width = abs(share) * BAR_PX
+    start = BAR_PX if share >= 0 else BAR_PX - width
+    shape = tag("rect", x=f"{start:.1f}", y="2", width=f"{max(width, 1):.1f}", height="10",
+                class_="gain" if share >= 0 else "loss")  # fmt: skip
+    middle = tag("line", x1=BAR_PX, x2=BAR_PX, y1="0", y2="14", class_="axis")
+    return tag("svg", shape, middle, width=2 * BAR_PX, height="14", aria_hidden="true")
+
+
+def _head(*words: str) -> Html:
+    return tag("thead", tag("tr", *(tag("th", word, scope="col") if word else tag("td") for word in words)))
+
+
+def _number(text: str, class_: str = "number") -> Html:
+    return tag("td", text, class_=class_)
+
+
+def _one(value: float | None) -> str:
+    return "–" if value is None else f"{value:.1f}"
+
+
+def _with_spread(value: float, spread: float | None, sign: bool = False) -> str:
+    return (f"{value:+.1f}" if sign else f"{value:.1f}") + ("" if spread is None else f" ± {spread:.1f}")
+
+
+def _scrolled(table: Html) -> Html:
+    """A wide table scrolls by itself, also by keyboard, and the page does not."""
+    return tag("div", table, class_="scroll", tabindex="0")
