@@ -13,8 +13,8 @@ from evplace.errors import MissingExtraError
 from evplace.evaluation import OUTCOMES, Result
 from evplace.storage import new_file
 
-Curve = tuple[str, NDArray[np.float64], bool]
-"""Its name, (n, 2) recall and precision, and whether it is another's (drawn dashed)."""
+Curve = tuple[str, NDArray[np.float64], int, bool]
+"""Its name, (n, 2) recall and precision, the number of its colour, and whether it is drawn dashed."""
 
 COLOURS = {"events": ("#1b6ca8", "#8fc1e3"), "colour": ("#c4622d", "#efb998")}
 """Input -> colour of its first and of its second matcher."""
@@ -91,19 +91,19 @@ def bars_chart(groups: Mapping[str, Sequence[Mapping[str, Any]]], path: str | Pa
 
 def curve_chart(curve: NDArray[np.float64], path: str | Path) -> None:
     """A result's precision-recall curve (thresholds, 4), as a .png. Raises MissingExtraError."""
-    curves_chart("", [("", curve[:, [2, 1]], False)], path)
+    curves_chart("", [("", curve[:, [2, 1]], 0, False)], path)
 
 
 def curves_chart(title: str, curves: Sequence[Curve], path: str | Path) -> None:
     """Precision over recall of several methods, as a .png. Raises MissingExtraError without matplotlib."""
-    named = any(label for label, _, _ in curves)
+    named = any(label for label, *_ in curves)
     figure = _new_figure(8 if named else 5, 4)
     axes = figure.add_subplot(
         xlabel="recall", ylabel="precision", xlim=(0, 1.02), ylim=(0, 1.02), title=title
     )
-    for number, (label, points, dashed) in enumerate(curves):
+    for label, points, colour, dashed in curves:
         axes.plot(
-            points[:, 0], points[:, 1], "--" if dashed else "-", color=PALETTE[number % len(PALETTE)],
+            points[:, 0], points[:, 1], "--" if dashed else "-", color=PALETTE[colour % len(PALETTE)],
             marker="." if len(points) < 30 else None, label=label,
         )  # fmt: skip
     axes.grid(alpha=0.3)

@@ -38,7 +38,8 @@ def table2() -> dict[str, object]:
     """Two matchers, two inputs (events from two sensors), both rules."""
     rows = [
         {
-            "database": "day-1", "query": query, "input": kind, "sensor": sensor, "matcher": matcher, "rule": rule,
+            "database": "day-1", "query": query, "input": kind, "sensor": sensor, "matcher": matcher,
+            "rule": rule,
             "mean": 90.0 - 9 * number - (30 if kind == "colour" else 0) - (10 if rule == "view" else 0),
             "spread": 1.5, "seeds": 3, "values": [], "seen": 88.25, "rejected": 3.5, "chance": 4.0,
             "paper": 85.8 if sensor != "weak" and rule == "places" else None,
@@ -49,8 +50,8 @@ def table2() -> dict[str, object]:
         for kind, sensor in (("events", "ideal"), ("events", "weak"), ("colour", "camera"))
     ]  # fmt: skip
     return {
-        "format": "evplace-table-1", "title": "Table 2: events and colour", "rows": rows,
-        "settings": {"cell_m": 20, "train": {"steps": 1000}}, "versions": {"evplace": "0.1.0"}, "took_s": 321.5,
+        "format": "evplace-table-1", "title": "Table 2: events and colour", "rows": rows, "took_s": 321.5,
+        "settings": {"cell_m": 20, "train": {"steps": 1000}}, "versions": {"evplace": "0.1.0"},
     }  # fmt: skip
 
 
@@ -81,7 +82,8 @@ def ablations() -> dict[str, object]:
             "effect": effect, "effect_spread": 0.8, "verdict": verdict, "seeds": 3,
         }
         for name, effect, verdict in [
-            ("no blur", -0.3, "no effect seen"), ("half the K", -12.5, "worse"), ("no last ReLU", 4.5, "better")
+            ("no blur", -0.3, "no effect seen"), ("half the K", -12.5, "worse"),
+            ("no last ReLU", 4.5, "better"),
         ]
     ]  # fmt: skip
     return {"format": "evplace-ablations-1", "baseline": {"query": "night-1", "mean": 90.0}, "rows": rows}

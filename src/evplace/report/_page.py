@@ -139,6 +139,7 @@ def _line(line: Line) -> dict[str, Any]:
         "ap": _rounded(line.average_precision),
         "spread": _rounded(line.spread),
         "paper": line.paper,
+        "colour": line.colour,
     }
 
 

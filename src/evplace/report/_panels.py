@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from evplace.evaluation import Result
 from evplace.report._found import Curve, Found, PaperCurve
@@ -13,6 +14,8 @@ MOST_CURVES = 10
 """Curves in a panel of results: more cannot be told apart."""
 CLOSE = 0.002
 """Points nearer than this in recall and in precision look like one."""
+PAPERS = "paper: "
+"""Before the labels of the paper's curves."""
 
 Point = tuple[float, float, float | None]
 """Recall, precision and the value of the parameter, None where it is not known."""
@@ -30,6 +33,8 @@ class Line:
     spread: float | None = None
     paper: bool = False
     """Read off the paper's figure: drawn dashed."""
+    colour: int = 0
+    """Number of its colour; the paper's curve of a method has that of ours."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ def panels(found: Found) -> list[Panel]:
         return []
     ranked = sorted(found.results.items(), key=lambda pair: -(pair[1].figures["average_precision"] or 0))
     title = "All results" if len(ranked) <= MOST_CURVES else f"The {MOST_CURVES} results that are best by it"
-    return [Panel(title, [result_line(name, result) for name, result in ranked[:MOST_CURVES]])]
+    return [Panel(title, _coloured([result_line(name, result) for name, result in ranked[:MOST_CURVES]]))]
 
 
 def result_line(label: str, result: Result) -> Line:
@@ -73,11 +78,21 @@ def _panel(name: str, curves: Sequence[Curve], papers: Sequence[PaperCurve]) -> 
         lines.append(Line(label, points, curve.parameter, curve.average_precision, curve.spread))
     theirs = [curve for curve in papers if curve.panel == name]
     lines += [
-        Line(f"paper: {curve.method}", _known((*point[:2], None) for point in curve.points), paper=True)
+        Line(PAPERS + curve.method, _known((*point[:2], None) for point in curve.points), paper=True)
         for curve in theirs
     ]
     queries = list(dict.fromkeys(curve.query for curve in chosen if curve.query))
-    return Panel(f"{name} ({', '.join(queries)})" if queries else name, lines)
+    return Panel(f"{name} ({', '.join(queries)})" if queries else name, _coloured(lines))
+
+
+def _coloured(lines: list[Line]) -> list[Line]:
+    """A colour for each method, told by the words of its label in any order."""
+    numbers: dict[frozenset[str], int] = {}
+    coloured = []
+    for line in lines:
+        words = frozenset(re.findall(r"\w+", line.label.removeprefix(PAPERS).lower()))
+        coloured.append(replace(line, colour=numbers.setdefault(words, len(numbers))))
+    return coloured
 
 
 def _known(points: Iterable[tuple[float | None, ...]]) -> list[Point]:

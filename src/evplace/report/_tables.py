@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from itertools import groupby
 from typing import Any
 
 from evplace.evaluation import Result
@@ -48,13 +47,15 @@ def ablations(rows: Sequence[Ablation]) -> Html:
     """What each change did, from the best to the worst."""
     ranked = sorted(rows, key=lambda row: -row.effect)
     widest = max((abs(row.effect) for row in ranked), default=0) or 1
-    head = _head("change", "", "query", "accuracy", "effect in points", "", "verdict")
+    words = [tag("th", word, scope="col") for word in ("change", "what it is", "query")]
+    numbers = [_number_head("accuracy in %"), _number_head("effect in points"), tag("td")]
+    head = tag("thead", tag("tr", *words, *numbers, tag("th", "verdict", scope="col")))
     body = [
         tag(
             "tr",
             tag("th", row.name, scope="row"),
-            tag("td", row.change),
-            tag("td", row.query),
+            tag("td", row.change, class_="words"),
+            tag("td", row.query, class_="short"),
             _number(_with_spread(row.mean, row.spread)),
             _number(_with_spread(row.effect, row.effect_spread, sign=True)),
             tag("td", _bar(row.effect / widest), class_="bar"),
@@ -70,7 +71,8 @@ def overview(results: Mapping[str, Result]) -> Html:
     shown = [
         key for key in OVERVIEW if any(result.figures.get(key) is not None for result in results.values())
     ]
-    head = _head("result", "queries", *(OVERVIEW[key] for key in shown), "took")
+    heads = ("queries", *(OVERVIEW[key] for key in shown), "took")
+    head = tag("thead", tag("tr", tag("th", "result", scope="col"), *map(_number_head, heads)))
     body = [
         tag(
             "tr",
@@ -186,55 +188,52 @@ def _legend(rows: Sequence[TableRow]) -> Html:
 
 def _block(matcher: str, rows: Sequence[TableRow]) -> Html:
     """A matcher's table: a row for each database and query, columns for each input and sensor."""
-    kinds = list(dict.fromkeys((row.input, row.sensor) for row in rows))
-    inputs = [name for name, _ in kinds]
-    printed = {
-        kind
-        for kind in kinds
-        if any(row.paper is not None for row in rows if (row.input, row.sensor) == kind)
-    }
+    kinds = list(dict.fromkeys(_kind(row) for row in rows))
+    printed = {_kind(row) for row in rows if row.paper is not None}
     chance = any(row.chance is not None for row in rows)
-    heads = [
-        tag("th", name, tag("small", sensor) if inputs.count(name) > 1 else None, scope="colgroup",
-            colspan=1 + ((name, sensor) in printed))
-        for name, sensor in kinds
-    ]  # fmt: skip
-    top = tag("tr", *(tag("th", word, scope="col", rowspan=2) for word in ("database", "query")), *heads,
-              tag("th", "chance", scope="col", rowspan=2) if chance else None)  # fmt: skip
-    under = [
-        join(tag("th", "ours", scope="col"), tag("th", "paper", scope="col") if kind in printed else None)
-        for kind in kinds
-    ]
+    cases: dict[tuple[str, str], list[TableRow]] = {}
+    for row in rows:
+        cases.setdefault((row.database, row.query), []).append(row)
     body = []
-    for (database, query), group in groupby(
-        sorted(rows, key=_order(rows)), key=lambda row: (row.database, row.query)
-    ):
-        of_kind = {(row.input, row.sensor): row for row in group}
+    for (database, query), of_case in cases.items():
+        of_kind = {_kind(row): row for row in of_case}
         cells = [_cells(of_kind.get(kind), kind in printed) for kind in kinds]
-        known = [row.chance for row in of_kind.values() if row.chance is not None]
-        last = _number(_one(known[0] if known else None)) if chance else None
+        known = next((row.chance for row in of_case if row.chance is not None), None)
+        last = _number(_one(known)) if chance else None
         body.append(tag("tr", tag("td", database), tag("th", query, scope="row"), *cells, last))
-    table = tag("table", tag("caption", matcher), tag("thead", top, tag("tr", *under)), tag("tbody", *body))
-    return _scrolled(table)
+    return _scrolled(
+        tag("table", tag("caption", matcher), _block_head(kinds, printed, chance), tag("tbody", *body))
+    )
 
 
-def _order(rows: Sequence[TableRow]) -> Any:
-    """Sorts rows by the first appearance of their database and query."""
-    places = {
-        key: number for number, key in enumerate(dict.fromkeys((row.database, row.query) for row in rows))
-    }
-    return lambda row: places[row.database, row.query]
+def _block_head(kinds: Sequence[tuple[str, str]], printed: set[tuple[str, str]], chance: bool) -> Html:
+    """Two lines: the inputs with their sensors where there are several; and ours beside the paper's."""
+    inputs = [name for name, _ in kinds]
+    top, under = [], []
+    for kind in kinds:
+        name, sensor = kind
+        told = tag("small", sensor) if inputs.count(name) > 1 else None
+        span = 2 if kind in printed else 1
+        top.append(tag("th", name, told, scope="colgroup", class_="group", colspan=span))
+        under.append(tag("th", "ours", scope="col", class_="group"))
+        under.append(tag("th", "paper", scope="col") if kind in printed else Html())
+    first = [tag("th", word, scope="col", rowspan=2) for word in ("database", "query")]
+    last = tag("th", "chance", scope="col", rowspan=2, class_="number") if chance else None
+    return tag("thead", tag("tr", *first, *top, last), tag("tr", *under))
+
+
+def _kind(row: TableRow) -> tuple[str, str]:
+    return row.input, row.sensor
 
 
 def _cells(row: TableRow | None, with_paper: bool) -> Html:
     if row is None:
-        return join(_number("–"), _number("–") if with_paper else None)
+        return join(_number("–", "number group"), _number("–") if with_paper else None)
     beside = [f"seen {_one(row.seen)}"] if row.seen is not None else []
     beside += [f"rejected {_one(row.rejected)}"] if row.rejected is not None else []
-    ours = tag(
-        "td", tag("b", _with_spread(row.mean, row.spread)), tag("small", ", ".join(beside)), class_="number"
-    )
-    return join(ours, _number(_one(row.paper), "number paper") if with_paper else None)
+    ours = (tag("b", _with_spread(row.mean, row.spread)), tag("small", ", ".join(beside)))
+    paper = _number(_one(row.paper), "number paper") if with_paper else None
+    return join(tag("td", *ours, class_="number group"), paper)
 
 
 def _bar(share: float) -> Html:
@@ -247,8 +246,8 @@ def _bar(share: float) -> Html:
     return tag("svg", shape, middle, width=2 * BAR_PX, height="14", aria_hidden="true")
 
 
-def _head(*words: str) -> Html:
-    return tag("thead", tag("tr", *(tag("th", word, scope="col") if word else tag("td") for word in words)))
+def _number_head(word: str) -> Html:
+    return tag("th", word, scope="col", class_="number")
 
 
 def _number(text: str, class_: str = "number") -> Html:

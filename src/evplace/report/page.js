@@ -54,7 +54,7 @@ function itemsPlot(place, result, show) {
   place.append(canvas, legend([...right, ...known]));
   const plot = {};
   drawn(canvas, (width) => {
-    const height = Math.min(360, Math.max(240, width * 0.6));
+    const height = Math.min(360, Math.max(240, width * 0.4));
     const count = result.item.length;
     const items = result.figures.items;
     const x = { low: 0, high: Math.max(1, count - 1), step: niceStep(count, width / 90), name: "query" };
@@ -191,8 +191,8 @@ function figures(result) {
   return element("div", { class: "tiles small" }, ...tiles);
 }
 
-function panel(title, fill) {
-  const place = element("div", { class: "panel" }, element("h3", {}, title));
+function panel(title, kind, fill) {
+  const place = element("div", { class: `panel ${kind}` }, element("h3", {}, title));
   return [place, () => fill(place)];
 }
 
@@ -213,10 +213,10 @@ function look(place, result) {
   };
   slider.addEventListener("input", () => show(Number(slider.value)));
   const parts = [
-    panel("Along the drive", (inside) => marks.push(itemsPlot(inside, result, show))),
+    panel("Along the drive", "wide", (inside) => marks.push(itemsPlot(inside, result, show))),
     result.query_xy === null ? null
-      : panel("From above: how far off", (inside) => marks.push(routePlot(inside, result, far, show))),
-    panel("Precision and recall", (inside) => curvePlot(inside, { title: result.name, lines: [result.curve] })),
+      : panel("From above: how far off", "", (inside) => marks.push(routePlot(inside, result, far, show))),
+    panel("Precision and recall", "", (inside) => curvePlot(inside, { title: result.name, lines: [result.curve] })),
   ].filter((part) => part !== null);
   const took = result.took_s === null ? "" : `, ${short(result.took_s)} s`;
   const details = element("details", {}, element("summary", {}, `Settings, versions and all figures${took}`),

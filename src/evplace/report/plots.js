@@ -76,11 +76,10 @@ function curvePlot(place, panel) {
   const told = element("output", { "aria-live": "polite" });
   const legend = element("div", { class: "legend" });
   const hidden = new Set();
-  let colour = 0;
-  const looks = lines.map((line, number) => {
-    const theirs = lines.slice(0, number).filter((other) => other.paper).length;
-    return { stroke: `var(--c${(line.paper ? theirs : colour++) % 8})`, dash: line.paper ? "6 4" : "none" };
-  });
+  const looks = lines.map((line) => ({
+    stroke: `var(--c${line.colour % 8})`,
+    dash: line.paper ? "6 4" : "none",
+  }));
   const name = (line) => {
     const spread = line.spread === null ? "" : ` ± ${line.spread.toFixed(3)}`;
     return line.label + (line.ap === null ? "" : ` (AP ${line.ap.toFixed(3)}${spread})`);
