@@ -29,6 +29,7 @@ OUTCOME_WORDS = dict(
 
 ERROR_EDGES_M = (10.0, 20.0, 40.0, 80.0)
 """Where the colours of errors change, in metres."""
+ERROR_WORDS = ("below 10 m", "10 to 20 m", "20 to 40 m", "40 to 80 m", "80 m and more")
 ERROR_COLOURS = ("#2c7fb8", "#7fb8d6", "#d9b65c", "#e8853a", "#b2381a")
 
 
@@ -144,12 +145,13 @@ def route_chart(result: Result, path: str | Path) -> None:
     if result.item_xy is not None:
         axes.scatter(*(result.item_xy - (west, south)).T, 12, "0.85", label="the map")
     accepted = result.answers.accepted & np.isfinite(result.error_m)
-    band = np.digitize(result.error_m, ERROR_EDGES_M)
-    places = [(~accepted, "0.55", "rejected")]
-    words = [f"below {ERROR_EDGES_M[0]:.0f} m", *(f"{edge:.0f} m and more" for edge in ERROR_EDGES_M)]
-    places += [(accepted & (band == n), ERROR_COLOURS[n], word) for n, word in enumerate(words)]
-    for chosen, colour, word in places:
-        axes.scatter(*(result.query_xy[chosen] - (west, south)).T, 9, colour, label=word)
+    here = (result.query_xy - (west, south)).T
+    axes.scatter(*here[:, ~accepted], 9, "0.55", label="rejected")
+    bands = np.digitize(result.error_m[accepted], ERROR_EDGES_M)
+    colours = np.array(ERROR_COLOURS)[bands]  # in the order of the drive: no colour lies over all others
+    axes.scatter(*here[:, accepted], 9, colours)
+    for colour, words in zip(ERROR_COLOURS, ERROR_WORDS, strict=True):
+        axes.scatter([], [], 9, colour, label=words)
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize="small", markerscale=2)
     _save(figure, path)
 

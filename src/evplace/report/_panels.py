@@ -55,7 +55,11 @@ def panels(found: Found) -> list[Panel]:
     if len(found.results) < 2:
         return []
     ranked = sorted(found.results.items(), key=lambda pair: -(pair[1].figures["average_precision"] or 0))
-    title = "All results" if len(ranked) <= MOST_CURVES else f"The {MOST_CURVES} results that are best by it"
+    title = (
+        "All results"
+        if len(ranked) <= MOST_CURVES
+        else f"The {MOST_CURVES} results of highest average precision"
+    )
     return [Panel(title, _coloured([result_line(name, result) for name, result in ranked[:MOST_CURVES]]))]
 
 

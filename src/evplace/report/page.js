@@ -117,12 +117,18 @@ function routePlot(place, result, far, show) {
     const rejected = placed.filter((query) => !accepted(query) && result.outcome[query] >= 0);
     dots(picture, rejected.map((query) => at(here[query])), { stroke: "var(--rejected)", "stroke-width": 7 });
     dots(picture, rejected.map((query) => at(here[query])), { stroke: "var(--panel)", "stroke-width": 3.5 });
-    ERROR_WORDS.forEach((_, number) => {
-      const chosen = placed.filter((query) => accepted(query) && far[query] !== null && band(query) === number);
-      dots(picture, chosen.map((query) => at(here[query])), { stroke: `var(--e${number})`, "stroke-width": 5 + number });
-    });
+    // In the order of the drive, a path for each stretch of one colour: no colour lies over all others.
+    const stretches = [];
+    for (const query of placed.filter((one) => accepted(one) && far[one] !== null)) {
+      const last = stretches.at(-1);
+      if (last && last.band === band(query)) last.queries.push(query);
+      else stretches.push({ band: band(query), queries: [query] });
+    }
+    for (const { band: number, queries } of stretches) {
+      dots(picture, queries.map((query) => at(here[query])), { stroke: `var(--e${number})`, "stroke-width": 6 });
+    }
     scaleBar(picture, height - 12, width, scale);
-    const arrow = svg("g", { class: "north", transform: `translate(${width - 18} 8)` }, picture);
+    const arrow = svg("g", { class: "north", transform: `translate(${width - 16} ${height - 34})` }, picture);
     svg("path", { d: "M0 0l6 16-6-4-6 4z" }, arrow);
     svg("text", { x: 0, y: 28, "text-anchor": "middle" }, arrow, "N");
     const link = svg("line", { class: "cursor" }, picture);

@@ -87,8 +87,9 @@ function curvePlot(place, panel) {
   const hint = "Point at a curve, or use the arrow keys, for its values.";
   lines.forEach((line, number) => {
     const swatch = svg("svg", { width: 26, height: 10, "aria-hidden": "true" });
-    svg("line", { x1: 1, x2: 25, y1: 5, y2: 5, stroke: looks[number].stroke, "stroke-width": 3,
-      "stroke-dasharray": looks[number].dash }, swatch);
+    const { stroke, dash } = looks[number];
+    if (line.points.length === 1) svg("circle", { cx: 13, cy: 5, r: 5, fill: stroke }, swatch);
+    else svg("line", { x1: 1, x2: 25, y1: 5, y2: 5, stroke, "stroke-width": 3, "stroke-dasharray": dash }, swatch);
     const button = element("button", { type: "button", "aria-pressed": "true" }, swatch, name(line));
     button.addEventListener("click", () => {
       if (!hidden.delete(number)) hidden.add(number);
