@@ -53,6 +53,18 @@ def test_faults_are_one_line(results: Path, tmp_path: Path, capsys: Capture) -> 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "table2.json"]
 
 
+def test_the_reference_drive_lends_a_networks_map_its_images(results: Path, tmp_path: Path) -> None:
+    pytest.importorskip("torch", reason="the network needs the extra 'train'")
+    folder = results.parent
+    day = [f"{folder}/day.aedat4", "--track", f"{folder}/day.csv"]
+    night = [f"{folder}/night.aedat4", "--track", f"{folder}/night.csv"]
+    assert main(["images", *day, "-o", f"{tmp_path}/day"]) == 0
+    assert main(["train", *day, "-o", f"{tmp_path}/net.evp", "--steps", "2", "--batch", "8"]) == 0
+    command = ["evaluate", f"{tmp_path}/net.evp", *night, "-o", f"{tmp_path}/r"]
+    assert main([*command, "--reference", f"{tmp_path}/day"]) == 0
+    assert (tmp_path / "r" / "samples.npy").exists()
+
+
 def test_the_reference_drive_is_told_to_evaluate(results: Path, tmp_path: Path, capsys: Capture) -> None:
     folder = results.parent
     command = ["evaluate", f"{folder}/street.evp", f"{folder}/night.aedat4", "-o", f"{tmp_path}/r"]

@@ -97,3 +97,10 @@ def write_run(folder: Path, results: int = 2) -> Path:
     for number in range(results):
         make_result(number).save(folder / "results" / f"night-{number} events")
     return folder
+
+
+def make_unanswered() -> Result:
+    """A drive on which nothing is answered at all: there is no curve and nothing accepted."""
+    here = np.column_stack([np.arange(6.0), np.zeros(6)])
+    nothing = Answers(np.full(6, -1), np.full(6, np.nan), np.zeros(6, np.bool_))
+    return measure(nothing, truth.by_radius(here, here[:2], 1.0), positions=here[:2], query_xy=here)

@@ -11,9 +11,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from made_results import make_result, write_run
+from made_results import make_result, make_unanswered, write_run
 
-from evplace.report._found import look
+from evplace.report._found import Found, look
 from evplace.report._page import page
 
 FLAGS = (
@@ -118,6 +118,12 @@ def test_every_control_works(opened: Open, text: str) -> None:
     assert len(found["images"]) > 16
     assert set(found["images"]) == {16}
     assert not found["scrolls"]
+
+
+def test_a_drive_without_answers_is_drawn(opened: Open) -> None:
+    document, complaints = opened(page(Found("nothing", None, None, None, {"nothing": make_unanswered()})))
+    assert complaints == []
+    assert "Query 0: no item, rejected, though known" in document
 
 
 def test_a_complaint_would_be_heard(opened: Open) -> None:

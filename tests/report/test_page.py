@@ -73,7 +73,7 @@ def test_results_alone_have_a_panel_and_an_overview() -> None:
     found = Found("some", None, None, None, {f"r{n}": make_result(n) for n in range(12)})
     text = page(found)
     assert '<section id="results"' in text
-    assert len(inlined(text)["panels"][0]["lines"]) == 10
+    assert len(inlined(text)["panels"][0]["lines"]) == 8
 
 
 def test_a_result_without_positions_images_or_truth() -> None:

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from made_results import make_result, write_run
+from made_results import make_result, make_unanswered, write_run
 
 from evplace.errors import OutputError
 from evplace.report import report
@@ -46,3 +46,9 @@ def test_without_matplotlib_there_is_still_a_page(tmp_path: Path, monkeypatch: p
     assert written.remark is not None
     assert "pip install 'evplace[report]'" in written.remark
     assert "pip install &#x27;evplace[report]&#x27;" in written.page.read_text()
+
+
+def test_a_drive_without_answers(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="plots need the extra 'report'")
+    make_unanswered().save(tmp_path / "nothing")
+    assert len(report(tmp_path / "nothing").plots) == 3

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from evplace.evaluation import Result
 from evplace.report._found import Curve, Found, PaperCurve
 
-MOST_CURVES = 10
+MOST_CURVES = 8
 """Curves in a panel of results: more cannot be told apart."""
 CLOSE = 0.002
 """Points nearer than this in recall and in precision look like one."""

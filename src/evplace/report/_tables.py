@@ -63,7 +63,7 @@ def ablations(rows: Sequence[Ablation]) -> Html:
         )
         for row in ranked
     ]  # fmt: skip
-    return _scrolled(tag("table", head, tag("tbody", *body)))
+    return _scrolled("Ablations", tag("table", head, tag("tbody", *body)))
 
 
 def overview(results: Mapping[str, Result]) -> Html:
@@ -83,7 +83,7 @@ def overview(results: Mapping[str, Result]) -> Html:
         )
         for name, result in results.items()
     ]
-    return _scrolled(tag("table", head, tag("tbody", *body)))
+    return _scrolled("All results", tag("table", head, tag("tbody", *body)))
 
 
 def facts(said: Mapping[str, Any]) -> Html:
@@ -155,7 +155,8 @@ def _of_results(results: Mapping[str, Result]) -> list[tuple[str, str, str]]:
         }
         if known:
             best = max(known, key=lambda name: known[name])
-            tiles.append((f"{percent(known[best])} %", words, best if len(results) > 1 else ""))
+            several = len(results) > 1
+            tiles.append((f"{percent(known[best])} %", f"best {words}" * several or words, best * several))
     return tiles
 
 
@@ -201,9 +202,8 @@ def _block(matcher: str, rows: Sequence[TableRow]) -> Html:
         known = next((row.chance for row in of_case if row.chance is not None), None)
         last = _number(_one(known)) if chance else None
         body.append(tag("tr", tag("td", database), tag("th", query, scope="row"), *cells, last))
-    return _scrolled(
-        tag("table", tag("caption", matcher), _block_head(kinds, printed, chance), tag("tbody", *body))
-    )
+    head = join(tag("caption", matcher), _block_head(kinds, printed, chance))
+    return _scrolled(matcher, tag("table", head, tag("tbody", *body)))
 
 
 def _block_head(kinds: Sequence[tuple[str, str]], printed: set[tuple[str, str]], chance: bool) -> Html:
@@ -262,6 +262,6 @@ def _with_spread(value: float, spread: float | None, sign: bool = False) -> str:
     return (f"{value:+.1f}" if sign else f"{value:.1f}") + ("" if spread is None else f" ± {spread:.1f}")
 
 
-def _scrolled(table: Html) -> Html:
+def _scrolled(name: str, table: Html) -> Html:
     """A wide table scrolls by itself, also by keyboard, and the page does not."""
-    return tag("div", table, class_="scroll", tabindex="0")
+    return tag("div", table, class_="scroll", tabindex="0", role="region", aria_label=name)

@@ -78,8 +78,8 @@ function itemsPlot(place, result, show) {
       dot.setAttribute("cx", cx);
       dot.setAttribute("cy", cy);
     };
-    made.picture.addEventListener("pointermove", (event) => {
-      const share = (pointer(event, made.picture)[0] - 46) / (width - 56);
+    whilePointing(made.picture, (at) => {
+      const share = (at - 46) / (width - 56);
       show(Math.round(Math.min(1, Math.max(0, share)) * (count - 1)));
     });
     if (plot.query !== undefined) plot.mark(plot.query);
@@ -145,8 +145,7 @@ function routePlot(place, result, far, show) {
       dot.setAttribute("cx", x);
       dot.setAttribute("cy", y);
     };
-    picture.addEventListener("pointermove", (event) => {
-      const [x, y] = pointer(event, picture);
+    whilePointing(picture, (x, y) => {
       const off = placed.map((query) => Math.hypot(at(here[query])[0] - x, at(here[query])[1] - y));
       const nearest = off.reduce((best, value, index) => (value < off[best] ? index : best), 0);
       if (off[nearest] < 30) show(placed[nearest]);

@@ -44,7 +44,7 @@ function niceStep(length, many) {
 // Axes with a grid; gives the two scales and the layer to draw into.
 function axes(place, box, x, y) {
   const { width, height, left = 46, right = 10, top = 8, bottom = 40 } = box;
-  const picture = svg("svg", { width, height, viewBox: `0 0 ${width} ${height}`, tabindex: 0, role: "img" });
+  const picture = svg("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img" });
   const atX = (value) => left + ((value - x.low) / (x.high - x.low)) * (width - left - right);
   const atY = (value) => height - bottom - ((value - y.low) / (y.high - y.low)) * (height - top - bottom);
   const grid = svg("g", { class: "grid" }, picture);
@@ -63,10 +63,14 @@ function axes(place, box, x, y) {
   return { picture, atX, atY };
 }
 
-// The mouse's place in a picture's own units.
-function pointer(event, picture) {
-  const box = picture.getBoundingClientRect();
-  return [event.clientX - box.left, event.clientY - box.top];
+// Calls told(x, y), in the picture's own units, where the mouse moves or a finger touches.
+function whilePointing(picture, told) {
+  const tell = (event) => {
+    const box = picture.getBoundingClientRect();
+    told(event.clientX - box.left, event.clientY - box.top);
+  };
+  picture.addEventListener("pointermove", tell);
+  picture.addEventListener("pointerdown", tell);
 }
 
 // Precision over recall. Hovering or the arrow keys show values; the legend hides and shows curves.
@@ -105,6 +109,7 @@ function curvePlot(place, panel) {
     const unit = { low: 0, high: 1, step: 0.2 };
     const box = { width, height: Math.min(380, Math.max(240, width * 0.75)) };
     const plot = axes(canvas, box, { ...unit, name: "recall" }, { ...unit, name: "precision" });
+    plot.picture.setAttribute("tabindex", 0);
     plot.picture.setAttribute("aria-label", `Precision over recall: ${panel.title}`);
     const spots = [];
     lines.forEach((line, number) => {
@@ -136,8 +141,7 @@ function curvePlot(place, panel) {
       cursor.setAttribute("visibility", "hidden");
       told.textContent = hint;
     };
-    plot.picture.addEventListener("pointermove", (event) => {
-      const [x, y] = pointer(event, plot.picture);
+    whilePointing(plot.picture, (x, y) => {
       const far = (spot) => Math.hypot(spot.at[0] - x, spot.at[1] - y);
       const nearest = spots.reduce((best, spot) => (best && far(best) <= far(spot) ? best : spot), null);
       if (nearest && far(nearest) < 30) choose(nearest);
