@@ -27,7 +27,8 @@ def plots(found: Found, page: Path) -> list[Path]:
         charts.bars_chart(_bars(found.table.rows), named("accuracy"))
     drawn = panels(found)
     for panel in drawn:
-        charts.curves_chart(panel.title, _curves(panel), named(f"curves-{_slug(panel.title)}"))
+        what = f"curves-{_slug(panel.title)}" if found.curves is not None else "curves"
+        charts.curves_chart(panel.title, _curves(panel), named(what))
     if found.results:
         name, result = next(iter(found.results.items()))
         if not drawn:
