@@ -13,13 +13,25 @@ from evplace.errors import MissingExtraError
 from evplace.evaluation import OUTCOMES, Result
 from evplace.storage import new_file
 
-Curve = tuple[str, NDArray[np.float64], int, bool]
-"""Its name, (n, 2) recall and precision, the number of its colour, and whether it is drawn dashed."""
+Curve = tuple[str, NDArray[np.float64], int, str]
+"""Its name, (n, 2) recall and precision, the number of its colour, and its style: a key of STYLES."""
+
+STYLES: dict[str, dict[str, Any]] = {
+    "solid": {"linewidth": 2.0},
+    "thin": {"linewidth": 0.9},
+    "dotted": {"linestyle": ":", "linewidth": 1.8},
+    "dashdot": {"linestyle": "-.", "linewidth": 1.4},
+    "dashed": {"linestyle": "--", "linewidth": 1.4, "markerfacecolor": "none"},
+}
+"""Style of a curve -> how it is drawn."""
 
 COLOURS = {"events": ("#1b6ca8", "#8fc1e3"), "colour": ("#c4622d", "#efb998")}
 """Input -> colour of its first and of its second matcher."""
 
-PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5b4ea5", "#7a7a7a")
+PALETTE = (
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#5b4ea5", "#7a7a7a",
+    "#8b5a2b", "#1a1a1a",
+)  # fmt: skip
 """Colours that people with any colour vision tell apart (after Okabe and Ito), for lines and bars."""
 
 OUTCOME_COLOURS = dict(zip(OUTCOMES, ("#0072b2", "#d55e00", "#e69f00", "#9a9a9a"), strict=True))
@@ -92,7 +104,7 @@ def bars_chart(groups: Mapping[str, Sequence[Mapping[str, Any]]], path: str | Pa
 
 def curve_chart(curve: NDArray[np.float64], path: str | Path) -> None:
     """A result's precision-recall curve (thresholds, 4), as a .png. Raises MissingExtraError."""
-    curves_chart("", [("", curve[:, [2, 1]], 0, False)], path)
+    curves_chart("", [("", curve[:, [2, 1]], 0, "solid")], path)
 
 
 def curves_chart(title: str, curves: Sequence[Curve], path: str | Path) -> None:
@@ -102,11 +114,10 @@ def curves_chart(title: str, curves: Sequence[Curve], path: str | Path) -> None:
     axes = figure.add_subplot(
         xlabel="recall", ylabel="precision", xlim=(0, 1.02), ylim=(0, 1.02), title=title
     )
-    for label, points, colour, dashed in curves:
-        axes.plot(
-            points[:, 0], points[:, 1], "--" if dashed else "-", color=PALETTE[colour % len(PALETTE)],
-            marker="." if len(points) < 30 else None, label=label,
-        )  # fmt: skip
+    for label, points, colour, style in curves:
+        marker = "o" if len(points) == 1 else "." if len(points) < 30 else None
+        shade = PALETTE[colour % len(PALETTE)]
+        axes.plot(points[:, 0], points[:, 1], marker=marker, color=shade, label=label, **STYLES[style])
     axes.grid(alpha=0.3)
     if named:
         figure.legend(loc="outside right upper", frameon=False, fontsize="small")

@@ -16,7 +16,7 @@ from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns
 from evplace.tracks import Track
 from evplace.traverse import Traverse
-from evplace.truth import Truth, by_cells, by_places, by_view, only_views
+from evplace.truth import Truth, by_cells, by_places, only_views
 
 Rule = Literal["places", "view"]
 MARGIN_M = 1000.0
@@ -34,13 +34,12 @@ def evaluate(
 
     Without `truth`, the positions are: by `rule` places, an answer is right in the query's cell or one of its
     eight neighbours (paper, section 3.4), and a query is seen where the map has any such cell. By view it is
-    also needed that the map holds a reference within 20 m that looks within 34 degrees the same way.
+    seen only where the map holds a reference within 20 m that looks within 34 degrees the same way.
     `reference`, the map's own drive, lends a network's map the images of the samples; a map of images has
     them. Raises EvaluationError where query and map share no ground, or the truth or reference do not fit.
     """
     started = time.perf_counter()
-    show = _shown_by(where.map, query, reference)
-    track = _same_zone(where.map, query.track)
+    show = item_images(where.map, query, reference)
     truth = truth or truth_of(where.map, query, rule)
     path, rows = where.path(query)
     settings = {
@@ -49,7 +48,7 @@ def evaluate(
         "matcher": where.settings,
         "query": query.info.get("source"),
     }
-    xy = track.xy if track is not None else None
+    xy = xy_in(where.map, query)
     result = measure(path, truth, rows, where.map.items.position, query.t_us, settings, xy)
     result = dataclasses.replace(result, took_s=round(time.perf_counter() - started, 3))
     return sample(result, query.images, show) if show is not None else result
@@ -63,14 +62,21 @@ def truth_of(place_map: PlaceMap, query: Traverse, rule: Rule = "places") -> Tru
     if track is None:
         raise EvaluationError("the query has no positions: give its track, or the truth as a matrix")
     _check_overlap(place_map, track)
-    if rule == "view" and place_map.scorer != "network":
-        return by_view(track, _references(place_map))
     truth = _by_place(place_map, place_map.places, track)
     return only_views(truth, track, _references(place_map)) if rule == "view" else truth
 
 
-def _shown_by(place_map: PlaceMap, query: Traverse, reference: Traverse | None) -> ItemImages | None:
-    """What shows the map's items: its own images, else the images of `reference`; None without either."""
+def xy_in(place_map: PlaceMap, query: Traverse) -> NDArray[np.float64] | None:
+    """(queries, 2) the query's positions in metres of the map's zone; None without any."""
+    track = _same_zone(place_map, query.track)
+    return track.xy if track is not None else None
+
+
+def item_images(place_map: PlaceMap, query: Traverse, reference: Traverse | None) -> ItemImages | None:
+    """What shows the map's items: its own images, else the images of `reference`; None without either.
+
+    Raises EvaluationError where the reference's images are not like those of the query.
+    """
     if place_map.references is not None:
         own = place_map.references
         return lambda items: np.asarray(own[items])
@@ -98,7 +104,7 @@ def _middle_images(place_map: PlaceMap, reference: Traverse, items: NDArray[np.i
 
 def _by_place(place_map: PlaceMap, places: object, track: Track) -> Truth:
     assert isinstance(places, PlaceGrid)
-    if place_map.scorer == "network":
+    if place_map.items_are_places:
         return by_places(places, track.xy)
     return by_cells(track.xy, place_map.items.position, places.cell_m, places.origin)
 
@@ -106,7 +112,7 @@ def _by_place(place_map: PlaceMap, places: object, track: Track) -> Truth:
 def _by_runs(place_map: PlaceMap, places: PlaceRuns, query: Traverse) -> Truth:
     """Query and map in step: place i of the query is place i of the map."""
     truth = by_places(places, query.xy)
-    if place_map.scorer == "network":
+    if place_map.items_are_places:
         return truth
     columns = place_map.items.place
     return dataclasses.replace(truth, block=lambda part: truth.block(part)[:, columns], n_items=len(columns))

@@ -42,7 +42,7 @@ def inlined(text: str) -> dict[str, Any]:
 def test_every_part_is_there(run: Found) -> None:
     text = page(run)
     for words in (
-        "Table 2: events and colour", "Algorithm 1", "90.0 ± 1.5", "85.8", "seen 88.2, rejected 3.5",
+        "Table 2: events and colour", "Algorithm 1", "90.0 ± 1.5", "85.8", "seen 88.2", "rejected 3.5",
         'data-rule="view" hidden', "10 of 10", "▲ better", "▼ worse", "= no effect seen", "321",
         "train.steps", "<title>run</title>",
     ):  # fmt: skip
@@ -145,17 +145,14 @@ def test_images_keep_to_their_budget() -> None:
     assert [len(shown) for shown in sample_images(results, budget=1).values()] == [1, 1, 1]
 
 
-def test_the_papers_curves_have_the_colour_of_ours() -> None:
+def test_colours_tell_methods_and_styles_inputs() -> None:
     points = [[0.5, 0.1, 0.9], [0.6, None, 0.8]]
-    ours = (
-        Curve("p", points, matcher="graph", input="events"),
-        Curve("p", points, matcher="graph", input="colour"),
-    )
-    papers = (PaperCurve("p", "Graph (colour)", [[0.1, 0.2]]), PaperCurve("p", "SeqSLAM", [[0.1, 0.2]]))
+    ours = tuple(Curve("p", points, matcher="graph, 0.1", input=kind) for kind in ("events", "colour"))
+    papers = (PaperCurve("p", "Graph, colour", [[0.1, 0.2]]), PaperCurve("p", "SeqSLAM", [[0.1, 0.2]]))
     (panel,) = panels(Found("f", None, Sheet(ours, papers), None, {}))
     assert [len(line.points) for line in panel.lines] == [1, 1, 1, 1]
-    assert [line.colour for line in panel.lines] == [0, 1, 1, 2]
-    assert [line.paper for line in panel.lines] == [False, False, True, True]
+    assert [line.colour for line in panel.lines] == [0, 0, 0, 1]
+    assert [line.style for line in panel.lines] == ["solid", "thin", "dashed", "dashed"]
 
 
 def test_thinned_curves_stay_close_to_the_exact_ones() -> None:

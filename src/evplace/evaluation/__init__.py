@@ -51,6 +51,7 @@ __all__ = [
     "measure",
     "precision_recall",
     "sample",
+    "versions",
 ]
 
 
@@ -88,7 +89,7 @@ def measure(
     times = np.full(len(judged), -1) if t_us is None else np.asarray(t_us, np.int64)
     resolved = dict(settings or {}) | {"truth": truth.rule}
     return Result(
-        figures, resolved, _versions(), answers, times, judged, seen, right, curve, scores,
+        figures, resolved, versions(), answers, times, judged, seen, right, curve, scores,
         true_item=true_item, query_xy=here, item_xy=there,
     )  # fmt: skip
 
@@ -186,8 +187,8 @@ def _known(xy: ArrayLike | None, many: int) -> Floats | None:
     return positions if np.isfinite(positions).any() else None
 
 
-def _versions() -> dict[str, str]:
-    """Of this package, python, and those packages at work here that can change a figure."""
+def versions() -> dict[str, str]:
+    """Versions of this package, python, and those packages at work here that can change a figure."""
     loaded = [name for name in ("numpy", "numba", "onnxruntime", "torch") if name in sys.modules]
     ours = {"evplace": __version__, "python": platform.python_version()}
     return ours | {name: metadata.version(name) for name in loaded}

@@ -45,6 +45,7 @@ class Ablation:
     mean: float
     effect: float
     query: str = ""
+    method: str = ""
     spread: float | None = None
     effect_spread: float | None = None
     verdict: str = ""

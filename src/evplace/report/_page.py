@@ -138,8 +138,8 @@ def _line(line: Line) -> dict[str, Any]:
         "parameter": line.parameter,
         "ap": _rounded(line.average_precision),
         "spread": _rounded(line.spread),
-        "paper": line.paper,
         "colour": line.colour,
+        "style": line.style,
     }
 
 

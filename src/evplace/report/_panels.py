@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,8 +13,10 @@ MOST_CURVES = 8
 """Curves in a panel of results: more cannot be told apart."""
 CLOSE = 0.002
 """Points nearer than this in recall and in precision look like one."""
-PAPERS = "paper: "
-"""Before the labels of the paper's curves."""
+STYLES = ("solid", "thin", "dotted", "dashdot")
+"""How the curves of the first, the second ... input are drawn; those of further ones as the last."""
+PAPER = "dashed"
+"""How the paper's curves are drawn."""
 
 Point = tuple[float, float, float | None]
 """Recall, precision and the value of the parameter, None where it is not known."""
@@ -31,10 +32,10 @@ class Line:
     """What is swept."""
     average_precision: float | None = None
     spread: float | None = None
-    paper: bool = False
-    """Read off the paper's figure: drawn dashed."""
     colour: int = 0
-    """Number of its colour; the paper's curve of a method has that of ours."""
+    """Number of its colour: one a method, the paper's included."""
+    style: str = STYLES[0]
+    """One of STYLES for each input, or PAPER."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,8 @@ def panels(found: Found) -> list[Panel]:
         if len(ranked) <= MOST_CURVES
         else f"The {MOST_CURVES} results of highest average precision"
     )
-    return [Panel(title, _coloured([result_line(name, result) for name, result in ranked[:MOST_CURVES]]))]
+    lines = [result_line(name, result) for name, result in ranked[:MOST_CURVES]]
+    return [Panel(title, [replace(line, colour=number) for number, line in enumerate(lines)])]
 
 
 def result_line(label: str, result: Result) -> Line:
@@ -71,32 +73,38 @@ def result_line(label: str, result: Result) -> Line:
 
 def _panel(name: str, curves: Sequence[Curve], papers: Sequence[PaperCurve]) -> Panel:
     chosen = [curve for curve in curves if curve.panel == name]
-    sensors = {
-        curve.input: {other.sensor for other in chosen if other.input == curve.input} for curve in chosen
-    }
-    lines = []
-    for curve in chosen:
-        sensor = f" ({curve.sensor})" if len(sensors[curve.input]) > 1 else ""
-        label = f"{curve.input}{sensor}, {curve.matcher}".removeprefix(", ")
-        points = _known((point[1], point[2], point[0]) for point in curve.points)
-        lines.append(Line(label, points, curve.parameter, curve.average_precision, curve.spread))
     theirs = [curve for curve in papers if curve.panel == name]
-    lines += [
-        Line(PAPERS + curve.method, _known((*point[:2], None) for point in curve.points), paper=True)
-        for curve in theirs
-    ]
+    methods = list(dict.fromkeys(curve.matcher for curve in chosen))
+    lines = [_line(curve, chosen, methods) for curve in chosen]
+    lines += [_paper_line(curve, methods) for curve in theirs]
     queries = list(dict.fromkeys(curve.query for curve in chosen if curve.query))
-    return Panel(f"{name} ({', '.join(queries)})" if queries else name, _coloured(lines))
+    return Panel(f"{name} ({', '.join(queries)})" if queries else name, lines)
 
 
-def _coloured(lines: list[Line]) -> list[Line]:
-    """A colour for each method, told by the words of its label in any order."""
-    numbers: dict[frozenset[str], int] = {}
-    coloured = []
-    for line in lines:
-        words = frozenset(re.findall(r"\w+", line.label.removeprefix(PAPERS).lower()))
-        coloured.append(replace(line, colour=numbers.setdefault(words, len(numbers))))
-    return coloured
+def _line(curve: Curve, beside: Sequence[Curve], methods: list[str]) -> Line:
+    """A curve among those `beside` it: its colour tells the method, its style the input."""
+    kinds = list(dict.fromkeys((other.input, other.sensor) for other in beside))
+    several = sum(name == curve.input for name, _ in kinds) > 1
+    sensor = f" ({curve.sensor})" if several else ""
+    return Line(
+        label=f"{curve.input}{sensor}, {curve.matcher}".removeprefix(", "),
+        points=_known((point[1], point[2], point[0]) for point in curve.points),
+        parameter=curve.parameter,
+        average_precision=curve.average_precision,
+        spread=curve.spread,
+        colour=methods.index(curve.matcher),
+        style=STYLES[min(kinds.index((curve.input, curve.sensor)), len(STYLES) - 1)],
+    )
+
+
+def _paper_line(curve: PaperCurve, methods: list[str]) -> Line:
+    """The paper's curve, in the colour of our method that is named like it; `methods` grows by new ones."""
+    method = curve.method.partition(",")[0]
+    alike = next((name for name in methods if name.lower().startswith(method.lower())), None)
+    if alike is None:
+        methods.append(method)
+    points = _known((*point[:2], None) for point in curve.points)
+    return Line(f"paper: {curve.method}", points, colour=methods.index(alike or method), style=PAPER)
 
 
 def _known(points: Iterable[tuple[float | None, ...]]) -> list[Point]:

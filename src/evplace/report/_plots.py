@@ -56,7 +56,7 @@ def _curves(panel: Panel) -> list[charts.Curve]:
     for line in panel.lines:
         area = "" if line.average_precision is None else f" (AP {line.average_precision:.3f})"
         points = np.array([point[:2] for point in line.points], np.float64).reshape(-1, 2)
-        curves.append((line.label + area, points, line.colour, line.paper))
+        curves.append((line.label + area, points, line.colour, line.style))
     return curves
 
 

@@ -47,7 +47,7 @@ def ablations(rows: Sequence[Ablation]) -> Html:
     """What each change did, from the best to the worst."""
     ranked = sorted(rows, key=lambda row: -row.effect)
     widest = max((abs(row.effect) for row in ranked), default=0) or 1
-    words = [tag("th", word, scope="col") for word in ("change", "what it is", "query")]
+    words = [tag("th", word, scope="col") for word in ("open in the paper", "changed to", "query")]
     numbers = [_number_head("accuracy in %"), _number_head("effect in points"), tag("td")]
     head = tag("thead", tag("tr", *words, *numbers, tag("th", "verdict", scope="col")))
     body = [
@@ -55,7 +55,7 @@ def ablations(rows: Sequence[Ablation]) -> Html:
             "tr",
             tag("th", row.name, scope="row"),
             tag("td", row.change, class_="words"),
-            tag("td", row.query, class_="short"),
+            tag("td", ", ".join(word for word in (row.query, row.method) if word), class_="short"),
             _number(_with_spread(row.mean, row.spread)),
             _number(_with_spread(row.effect, row.effect_spread, sign=True)),
             tag("td", _bar(row.effect / widest), class_="bar"),
@@ -120,26 +120,26 @@ def _headline_figures(found: Found) -> list[tuple[str, str, str]]:
 
 
 def _of_table(rows: Sequence[TableRow]) -> list[tuple[str, str, str]]:
-    """The first input by the paper's own matcher beside the others, and how often it beats the second."""
+    """The first input by the paper's own matcher beside colour, and how often it beats it."""
     of_rule = [row for row in rows if row.rule == rows[0].rule]
     matchers = [row.matcher for row in of_rule]
     matcher = "Algorithm 1" if "Algorithm 1" in matchers else matchers[0]
     main, *others = dict.fromkeys(row.input for row in of_rule)
+    rival = "colour" if "colour" in others else next(iter(others), None)
     cases: dict[tuple[str, str, str], dict[str, TableRow]] = {}
     for row in of_rule:  # of several sensors, the first
         cases.setdefault((row.database, row.query, row.matcher), {}).setdefault(row.input, row)
     tiles = []
     for case in (case for key, case in cases.items() if key[2] == matcher and main in case):
         row = case[main]
-        remarks = [f"{name} {case[name].mean:.1f}" for name in others if name in case]
+        remarks = [f"{rival} {case[rival].mean:.1f}"] if rival in case else []
         remarks += [] if row.paper is None else [f"paper {row.paper:.1f}"]
         value = f"{_with_spread(row.mean, row.spread)} %"
         tiles.append((value, f"{row.query}, {main}, {matcher}", ", ".join(remarks)))
-    pairs = [case for case in cases.values() if others and {main, others[0]} <= set(case)]
+    pairs = [(case[main], case[rival]) for case in cases.values() if rival in case and main in case]
     if pairs:
-        wins = sum(case[main].mean > case[others[0]].mean for case in pairs)
-        words = f"{main} better than {others[0]}"
-        tiles.append((f"{wins} of {len(pairs)}", words, "over all queries and matchers"))
+        wins = sum(one.mean > other.mean for one, other in pairs)
+        tiles.append((f"{wins} of {len(pairs)}", f"{main} better than {rival}", "all queries and matchers"))
     return tiles
 
 
@@ -192,6 +192,7 @@ def _block(matcher: str, rows: Sequence[TableRow]) -> Html:
     kinds = list(dict.fromkeys(_kind(row) for row in rows))
     printed = {_kind(row) for row in rows if row.paper is not None}
     chance = any(row.chance is not None for row in rows)
+    databases = {row.database for row in rows}
     cases: dict[tuple[str, str], list[TableRow]] = {}
     for row in rows:
         cases.setdefault((row.database, row.query), []).append(row)
@@ -201,12 +202,18 @@ def _block(matcher: str, rows: Sequence[TableRow]) -> Html:
         cells = [_cells(of_kind.get(kind), kind in printed) for kind in kinds]
         known = next((row.chance for row in of_case if row.chance is not None), None)
         last = _number(_one(known)) if chance else None
-        body.append(tag("tr", tag("td", database), tag("th", query, scope="row"), *cells, last))
-    head = join(tag("caption", matcher), _block_head(kinds, printed, chance))
+        first = tag("td", database) if len(databases) > 1 else None
+        body.append(tag("tr", tag("th", query, scope="row"), first, *cells, last))
+    learned = f" (database {next(iter(databases))})" if len(databases) == 1 and any(databases) else ""
+    words = ("query", "database") if len(databases) > 1 else ("query",)
+    caption = tag("caption", matcher, tag("small", learned))
+    head = join(caption, _block_head(words, kinds, printed, chance))
     return _scrolled(matcher, tag("table", head, tag("tbody", *body)))
 
 
-def _block_head(kinds: Sequence[tuple[str, str]], printed: set[tuple[str, str]], chance: bool) -> Html:
+def _block_head(
+    words: Sequence[str], kinds: Sequence[tuple[str, str]], printed: set[tuple[str, str]], chance: bool
+) -> Html:
     """Two lines: the inputs with their sensors where there are several; and ours beside the paper's."""
     inputs = [name for name, _ in kinds]
     top, under = [], []
@@ -217,7 +224,7 @@ def _block_head(kinds: Sequence[tuple[str, str]], printed: set[tuple[str, str]],
         top.append(tag("th", name, told, scope="colgroup", class_="group", colspan=span))
         under.append(tag("th", "ours", scope="col", class_="group"))
         under.append(tag("th", "paper", scope="col") if kind in printed else Html())
-    first = [tag("th", word, scope="col", rowspan=2) for word in ("database", "query")]
+    first = [tag("th", word, scope="col", rowspan=2) for word in words]
     last = tag("th", "chance", scope="col", rowspan=2, class_="number") if chance else None
     return tag("thead", tag("tr", *first, *top, last), tag("tr", *under))
 
@@ -229,11 +236,10 @@ def _kind(row: TableRow) -> tuple[str, str]:
 def _cells(row: TableRow | None, with_paper: bool) -> Html:
     if row is None:
         return join(_number("–", "number group"), _number("–") if with_paper else None)
-    beside = [f"seen {_one(row.seen)}"] if row.seen is not None else []
-    beside += [f"rejected {_one(row.rejected)}"] if row.rejected is not None else []
-    ours = (tag("b", _with_spread(row.mean, row.spread)), tag("small", ", ".join(beside)))
-    paper = _number(_one(row.paper), "number paper") if with_paper else None
-    return join(tag("td", *ours, class_="number group"), paper)
+    beside = {"seen": row.seen, "rejected": row.rejected}
+    small = [tag("small", f"{word} {_one(value)}") for word, value in beside.items() if value is not None]
+    ours = tag("td", tag("b", _with_spread(row.mean, row.spread)), *small, class_="number group")
+    return join(ours, _number(_one(row.paper), "number paper") if with_paper else None)
 
 
 def _bar(share: float) -> Html:

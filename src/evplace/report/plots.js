@@ -73,6 +73,22 @@ function whilePointing(picture, told) {
   picture.addEventListener("pointerdown", tell);
 }
 
+// How the curves of each input are drawn, and the paper's, which are dashed.
+const STYLES = {
+  solid: { "stroke-width": 2.4, "stroke-dasharray": "none" },
+  thin: { "stroke-width": 1.1, "stroke-dasharray": "none" },
+  dotted: { "stroke-width": 2.2, "stroke-dasharray": "1.5 3.5" },
+  dashdot: { "stroke-width": 1.8, "stroke-dasharray": "9 3 2 3" },
+  dashed: { "stroke-width": 1.8, "stroke-dasharray": "6 4" },
+};
+
+// A point of a curve; large where it is the only one, hollow where it is the paper's.
+function spot(parent, [cx, cy], line, look) {
+  const hollow = line.style === "dashed";
+  const r = line.points.length === 1 ? 4.5 : 2.3;
+  svg("circle", { cx, cy, r, fill: hollow ? "var(--panel)" : look.stroke, stroke: look.stroke, "stroke-width": 1.5 }, parent);
+}
+
 // Precision over recall. Hovering or the arrow keys show values; the legend hides and shows curves.
 function curvePlot(place, panel) {
   const lines = panel.lines.filter((line) => line.points.length);
@@ -80,10 +96,7 @@ function curvePlot(place, panel) {
   const told = element("output", { "aria-live": "polite" });
   const legend = element("div", { class: "legend" });
   const hidden = new Set();
-  const looks = lines.map((line) => ({
-    stroke: `var(--c${line.colour % 8})`,
-    dash: line.paper ? "6 4" : "none",
-  }));
+  const looks = lines.map((line) => ({ stroke: `var(--c${line.colour % 8})`, ...STYLES[line.style] }));
   const name = (line) => {
     const spread = line.spread === null ? "" : ` ± ${line.spread.toFixed(3)}`;
     return line.label + (line.ap === null ? "" : ` (AP ${line.ap.toFixed(3)}${spread})`);
@@ -91,9 +104,8 @@ function curvePlot(place, panel) {
   const hint = "Point at a curve, or use the arrow keys, for its values.";
   lines.forEach((line, number) => {
     const swatch = svg("svg", { width: 26, height: 10, "aria-hidden": "true" });
-    const { stroke, dash } = looks[number];
-    if (line.points.length === 1) svg("circle", { cx: 13, cy: 5, r: 5, fill: stroke }, swatch);
-    else svg("line", { x1: 1, x2: 25, y1: 5, y2: 5, stroke, "stroke-width": 3, "stroke-dasharray": dash }, swatch);
+    if (line.points.length === 1) spot(swatch, [13, 5], line, looks[number]);
+    else svg("line", { x1: 1, x2: 25, y1: 5, y2: 5, ...looks[number] }, swatch);
     const button = element("button", { type: "button", "aria-pressed": "true" }, swatch, name(line));
     button.addEventListener("click", () => {
       if (!hidden.delete(number)) hidden.add(number);
@@ -116,12 +128,8 @@ function curvePlot(place, panel) {
       if (hidden.has(number)) return;
       const places = line.points.map(([recall, precision]) => [plot.atX(recall), plot.atY(precision)]);
       const path = "M" + places.map((at) => at.map((value) => value.toFixed(1)).join(" ")).join("L");
-      const look = looks[number];
-      svg("path", { d: path, class: "curve", stroke: look.stroke, "stroke-dasharray": look.dash }, plot.picture);
-      const radius = places.length === 1 ? 5 : 2.5;
-      if (places.length < 30) {
-        for (const [cx, cy] of places) svg("circle", { cx, cy, r: radius, fill: look.stroke }, plot.picture);
-      }
+      svg("path", { d: path, class: "curve", ...looks[number] }, plot.picture);
+      if (places.length < 30) for (const at of places) spot(plot.picture, at, line, looks[number]);
       places.forEach((at, index) => spots.push({ at, number, index }));
     });
     const cursor = svg("circle", { r: 6, class: "cursor", visibility: "hidden" }, plot.picture);
