@@ -13,7 +13,7 @@ ROOMS = (
     "errors plugs storage settings workers events readers writers cleaning windows resampling "
     "representations tones images stream frames tracks spacing places truth traverse sheets simulators "
     "datasets capture city placemap network network_onnx augmentation checkpoint training distances "
-    "seqslam_images scorers matchers sweeps localizer evaluation trial doctor charts reproduction cli"
+    "seqslam_images scorers matchers sweeps localizer evaluation trial doctor charts reproduction report cli"
 ).split()
 """In the order of the data: a room imports only rooms before it, or files of its own."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import json
 from pathlib import Path
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from evplace import truth
 from evplace.errors import EvaluationError, OutputError
 from evplace.evaluation import (
+    OUTCOMES,
     RECALLS_AT,
     Result,
     average_precision,
@@ -22,7 +24,9 @@ from evplace.evaluation import (
     hits_at,
     measure,
     precision_recall,
+    sample,
 )
+from evplace.evaluation._samples import choose
 from evplace.matchers import Path as Answers
 
 
@@ -195,6 +199,89 @@ def test_damaged_results_are_refused(tmp_path: Path) -> None:
         with pytest.raises(EvaluationError, match="damaged"):
             Result.load(folder)
     assert json.loads((folder / "result.json").read_text() + "]") == []
+
+
+def with_images() -> Result:
+    """SIX with positions and samples: the image of query or item n is of the grey level n."""
+    xy = [[0, 1], [3, 3], [3, 6], [0, 0], [0, 0], [np.nan, 0]]
+    result = measure(
+        answers([0, 1, 1, -1, 0, -1]), SIX, positions=[[0, 0], [3, 5]], query_xy=xy, t_us=np.arange(6)
+    )
+    images = np.arange(6, dtype=np.uint8)[:, None, None].repeat(3, 1).repeat(4, 2)
+    return sample(result, images, lambda items: 100 + images[items])
+
+
+def test_outcomes_errors_and_the_right_item() -> None:
+    result = with_images()
+    assert [OUTCOMES[one] for one in result.outcome] == [
+        "right", "wrong", "right", "missed", "wrong", "unseen",
+    ]  # fmt: skip
+    assert result.true_item is not None
+    assert result.true_item.tolist() == [0, 0, 1, 1, -1, -1]
+    np.testing.assert_allclose(result.error_m[:3], [1, 2, 1])
+    assert np.isnan(result.error_m[3])
+    assert np.isnan(measure(answers([0] * 6), SIX).error_m).all()
+
+
+def test_the_nearest_right_item_is_the_true_one() -> None:
+    right = known([[1, 1, 1, 0], [0, 0, 0, 1]])
+    placed = measure(
+        answers([0, 0]), right, positions=[[0, 0], [9, 0], [5, 0], [6, 0]], query_xy=[[6, 0], [0, 0]]
+    )
+    assert placed.true_item is not None
+    assert placed.true_item.tolist() == [2, 3]
+    unplaced = measure(answers([0, 0]), right)
+    assert unplaced.true_item is not None
+    assert unplaced.true_item.tolist() == [1, 3]
+    with pytest.raises(EvaluationError, match=r"positions of shape \(1, 2\)"):
+        measure(answers([0, 0]), right, query_xy=[[0, 0]])
+
+
+def test_samples_mix_and_spread() -> None:
+    outcome = np.array([0, 1, 2, 3] * 100)
+    chosen = choose(outcome, 6)
+    assert np.array_equal(np.minimum(outcome[chosen], 2), [0, 1, 2, 0, 1, 2])
+    assert np.all(np.abs(np.diff(chosen) - 66.7) < 9)
+    assert choose(np.zeros(3, np.int64)).tolist() == [0, 1, 2]
+    assert choose(np.full(20, -1)).tolist() == []
+
+
+def test_samples_show_query_match_and_truth() -> None:
+    samples = with_images().samples
+    assert samples is not None
+    assert samples.query.tolist() == [0, 1, 2, 3, 4, 5]
+    assert samples.images[:, :, 0, 0].tolist() == [
+        [0, 100, 100], [1, 101, 100], [2, 101, 101], [3, 0, 101], [4, 100, 0], [5, 0, 0],
+    ]  # fmt: skip
+
+
+def test_what_a_report_needs_survives_the_disk(tmp_path: Path) -> None:
+    result = dataclasses.replace(with_images(), took_s=1.5)
+    result.save(tmp_path / "r")
+    assert {file.name for file in (tmp_path / "r").iterdir()} == {
+        "result.json", "matches.csv", "pr_curve.npy", "query_xy.npy", "item_xy.npy", "samples.npy",
+    }  # fmt: skip
+    again = Result.load(tmp_path / "r")
+    assert again.took_s == 1.5
+    for name in ("query_xy", "item_xy", "true_item"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(result, name))
+    assert again.samples is not None
+    assert result.samples is not None
+    np.testing.assert_array_equal(again.samples.images, result.samples.images)
+    for name in ("query_xy", "item_xy", "samples"):
+        (tmp_path / "r" / f"{name}.npy").unlink()
+    matches = (tmp_path / "r" / "matches.csv").read_text().splitlines()
+    (tmp_path / "r" / "matches.csv").write_text("\n".join(line.rsplit(",", 1)[0] for line in matches))
+    older = Result.load(tmp_path / "r")
+    assert (older.query_xy, older.item_xy, older.samples, older.true_item) == (None, None, None, None)
+
+
+@pytest.mark.parametrize("name", ["query_xy", "item_xy", "samples"])
+def test_files_of_another_result_are_refused(name: str, tmp_path: Path) -> None:
+    with_images().save(tmp_path / "r")
+    np.save(tmp_path / "r" / f"{name}.npy", np.zeros((1, 2)))
+    with pytest.raises(EvaluationError, match="damaged"):
+        Result.load(tmp_path / "r")
 
 
 def test_real_techniques_against_a_plain_count(data: Path) -> None:

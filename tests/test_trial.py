@@ -81,3 +81,45 @@ def test_a_query_is_put_into_the_maps_zone(day: Traverse) -> None:
     assert abs(there.xy - here.xy).max() > 1e5
     figures = evaluate(Localizer(place_map, "best"), there).figures
     assert (figures["accuracy"], figures["unseen"]) == (1, 0)
+
+
+def test_samples_come_from_the_map_or_from_its_drive(
+    image_map: PlaceMap, network_map: PlaceMap, day: Traverse, night: Traverse
+) -> None:
+    own = evaluate(Localizer(image_map, "best"), night).samples
+    assert own is not None
+    assert len(own.query) == 8
+    np.testing.assert_array_equal(own.images[:, 0], night.images[own.query])
+    lent = evaluate(Localizer(network_map, "best"), night, reference=day)
+    assert lent.samples is not None
+    assert lent.true_item is not None
+    centre = network_map.items.position[lent.true_item[lent.samples.query[0]]]
+    nearest = np.argmin(np.hypot(*(day.xy - centre).T))
+    np.testing.assert_array_equal(lent.samples.images[0, 2], day.images[nearest])
+    assert evaluate(Localizer(network_map, "best"), night).samples is None
+
+
+def test_samples_of_runs_show_the_middle_of_each(day: Traverse) -> None:
+    drive = dataclasses.replace(day, track=None)
+    place_map = train(drive, PlaceRuns(len(day), every=10), steps=2, batch=8)
+    result = evaluate(Localizer(place_map, "best"), drive, reference=drive)
+    assert result.samples is not None
+    assert result.true_item is not None
+    np.testing.assert_array_equal(
+        result.samples.images[:, 2], day.images[result.true_item[result.samples.query] * 10 + 5]
+    )
+
+
+def test_a_reference_that_does_not_fit_is_told(network_map: PlaceMap, day: Traverse, night: Traverse) -> None:
+    with pytest.raises(EvaluationError, match="reference drive has images of shape"):
+        evaluate(Localizer(network_map), night, reference=dataclasses.replace(day, images=day.images[:, ::2]))
+    with pytest.raises(EvaluationError, match="reference drive has no positions"):
+        evaluate(Localizer(network_map), night, reference=dataclasses.replace(day, track=None))
+
+
+def test_results_keep_positions_and_time(image_map: PlaceMap, night: Traverse) -> None:
+    result = evaluate(Localizer(image_map, "best"), night)
+    np.testing.assert_array_equal(result.query_xy, night.xy)
+    np.testing.assert_array_equal(result.item_xy, image_map.items.position)
+    assert result.took_s is not None
+    assert np.nanmedian(result.error_m) < 5

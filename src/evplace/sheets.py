@@ -31,10 +31,16 @@ def contact_sheet(
         Image.fromarray(sheet).save(partial, "PNG")
 
 
+def as_shown(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """An image (h, w) or (h, w, C) as (h, w, 3); event images as ink on paper."""
+    if image.ndim == 3 and image.shape[2] == 3:
+        return image
+    grey = image if image.ndim == 2 else image.max(axis=2)
+    return np.repeat(255 - grey[..., None], 3, axis=2)
+
+
 def _tile(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """An image as (h, w, 3); event images as ink on paper, at least 160 pixels wide."""
-    if image.ndim == 2 or image.shape[2] != 3:
-        grey = image if image.ndim == 2 else image.max(axis=2)
-        image = np.repeat(255 - grey[..., None], 3, axis=2)
-    zoom = max(1, 160 // image.shape[1])
-    return image.repeat(zoom, axis=0).repeat(zoom, axis=1)
+    """An image as it is shown, at least 160 pixels wide."""
+    shown = as_shown(image)
+    zoom = max(1, 160 // shown.shape[1])
+    return shown.repeat(zoom, axis=0).repeat(zoom, axis=1)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.errors import EvaluationError
-from evplace.evaluation import Result, measure
+from evplace.evaluation import ItemImages, Result, measure, sample
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns
@@ -22,14 +23,23 @@ MARGIN_M = 1000.0
 """A query further than this from all of the map's ground is taken for a mistake."""
 
 
-def evaluate(where: Localizer, query: Traverse, truth: Truth | None = None, rule: Rule = "places") -> Result:
+def evaluate(
+    where: Localizer,
+    query: Traverse,
+    truth: Truth | None = None,
+    rule: Rule = "places",
+    reference: Traverse | None = None,
+) -> Result:
     """Localise the whole `query` and measure the answers.
 
     Without `truth`, the positions are: by `rule` places, an answer is right in the query's cell or one of its
     eight neighbours (paper, section 3.4), and a query is seen where the map has any such cell. By view it is
     seen only where the map holds a reference within 20 m that looks within 34 degrees the same way.
-    Raises EvaluationError where query and map share no ground, or the truth does not fit.
+    `reference`, the map's own drive, lends a network's map the images of the samples; a map of images has
+    them. Raises EvaluationError where query and map share no ground, or the truth or reference do not fit.
     """
+    started = time.perf_counter()
+    show = item_images(where.map, query, reference)
     truth = truth or truth_of(where.map, query, rule)
     path, rows = where.path(query)
     settings = {
@@ -38,7 +48,10 @@ def evaluate(where: Localizer, query: Traverse, truth: Truth | None = None, rule
         "matcher": where.settings,
         "query": query.info.get("source"),
     }
-    return measure(path, truth, rows, where.map.items.position, query.t_us, settings)
+    xy = xy_in(where.map, query)
+    result = measure(path, truth, rows, where.map.items.position, query.t_us, settings, xy)
+    result = dataclasses.replace(result, took_s=round(time.perf_counter() - started, 3))
+    return sample(result, query.images, show) if show is not None else result
 
 
 def truth_of(place_map: PlaceMap, query: Traverse, rule: Rule = "places") -> Truth:
@@ -51,6 +64,42 @@ def truth_of(place_map: PlaceMap, query: Traverse, rule: Rule = "places") -> Tru
     _check_overlap(place_map, track)
     truth = _by_place(place_map, place_map.places, track)
     return only_views(truth, track, _references(place_map)) if rule == "view" else truth
+
+
+def xy_in(place_map: PlaceMap, query: Traverse) -> NDArray[np.float64] | None:
+    """(queries, 2) the query's positions in metres of the map's zone; None without any."""
+    track = _same_zone(place_map, query.track)
+    return track.xy if track is not None else None
+
+
+def item_images(place_map: PlaceMap, query: Traverse, reference: Traverse | None) -> ItemImages | None:
+    """What shows the map's items: its own images, else the images of `reference`; None without either.
+
+    Raises EvaluationError where the reference's images are not like those of the query.
+    """
+    if place_map.references is not None:
+        own = place_map.references
+        return lambda items: np.asarray(own[items])
+    if reference is None:
+        return None
+    if reference.images.shape[1:] != query.images.shape[1:]:
+        raise EvaluationError(
+            f"the reference drive has images of shape {reference.images.shape[1:]}, the query of "
+            f"{query.images.shape[1:]}: give the drive that the map was learned from"
+        )
+    return lambda items: np.asarray(reference.images[_middle_images(place_map, reference, items)])
+
+
+def _middle_images(place_map: PlaceMap, reference: Traverse, items: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) for each place (n,) the image of the reference drive nearest to its centre."""
+    if isinstance(place_map.places, PlaceRuns):
+        every = place_map.places.every
+        return np.minimum(items * every + every // 2, len(reference) - 1)
+    track = _same_zone(place_map, reference.track)
+    if track is None or not track.known.any():
+        raise EvaluationError("the reference drive has no positions: give a traverse with a track")
+    apart = np.hypot(*(place_map.items.position[items, None] - track.xy[None]).transpose(2, 0, 1))
+    return np.asarray(np.nanargmin(apart, axis=1), np.int64)
 
 
 def _by_place(place_map: PlaceMap, places: object, track: Track) -> Truth:

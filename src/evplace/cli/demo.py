@@ -56,10 +56,11 @@ def run(args: Args) -> int:
     drives = built_in_drives(args.out / "city", args.drive_m)
     rows = []
     for name, place_map in _maps(args, drives["day-1"]):
+        reference = Traverse.load(drives["day-1"] / INPUTS[name])
         for query in QUERIES:
             traverse = Traverse.load(drives[query] / INPUTS[name])
             for matcher, (kind, preset) in MATCHERS.items():
-                result = evaluate(Localizer(place_map, kind, preset), traverse)
+                result = evaluate(Localizer(place_map, kind, preset), traverse, reference=reference)
                 result.save(args.out / "results" / f"{query} {name} {matcher}", overwrite=True)
                 rows.append(_row(query, name, matcher, result))
     rows.sort(key=lambda row: (QUERIES.index(str(row["query"])), str(row["matcher"]) != "global-max"))

@@ -4,11 +4,13 @@ Examples:
   evplace evaluate campus.evp night.aedat4 --track night.nmea -o night.result
   evplace evaluate campus.evp night -o night.result --matcher seqslam
   evplace evaluate campus.evp night -o night.result --rule view       opposite directions are other views
+  evplace evaluate campus.evp night -o night.result --reference day   keeps images of some matches
   evplace evaluate street.evp query/ -o q.result --truth truth.npy    a matrix, rows = queries
 """
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -17,8 +19,9 @@ import tyro
 
 from evplace import settings
 from evplace.capture import open_traverse
+from evplace.charts import curve_chart
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
-from evplace.errors import OutputError
+from evplace.errors import MissingExtraError, OutputError
 from evplace.images import ImageSettings
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
@@ -60,6 +63,8 @@ class Args:
     """A setting of the matcher, as name=value."""
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
+    reference: Path | None = None
+    """The traverse that a network's map was learned from: lends the images of the sample matches."""
     scores: bool = False
     """Keep the score rows in the result."""
     size: tuple[int, int] | None = None
@@ -80,8 +85,11 @@ def run(args: Args) -> int:
     values = settings.from_pairs(args.set)
     where = Localizer(place_map, args.matcher, args.preset, args.mask, **values)
     query = _opened(args, where)
-    result = evaluate(where, query, _truth(args, place_map, query), args.rule)
+    reference = Traverse.load(args.reference) if args.reference is not None else None
+    result = evaluate(where, query, _truth(args, place_map, query), args.rule, reference)
     result.save(args.out, args.overwrite, args.scores)
+    with contextlib.suppress(MissingExtraError):  # a result is whole without its picture
+        curve_chart(result.curve, args.out / "pr_curve.png")
     if args.json:
         print_json(result.figures)
     else:

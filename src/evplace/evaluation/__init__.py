@@ -8,6 +8,7 @@ accuracy, as it does by all evidence in the paper; the accuracy on seen queries 
 
 from __future__ import annotations
 
+import dataclasses
 import platform
 import sys
 from collections.abc import Iterable, Mapping
@@ -31,20 +32,25 @@ from evplace.evaluation._measures import (
     hits_at,
     precision_recall,
 )
-from evplace.evaluation._result import Result
+from evplace.evaluation._result import OUTCOMES, Result
+from evplace.evaluation._samples import ItemImages, Samples, choose, pictures
 from evplace.matchers import Path as Answers
 from evplace.truth import Truth
 
 __all__ = [
     "CURVE",
+    "OUTCOMES",
     "RECALLS_AT",
+    "ItemImages",
     "Result",
+    "Samples",
     "average_precision",
     "compare",
     "gallery_spacing",
     "hits_at",
     "measure",
     "precision_recall",
+    "sample",
     "versions",
 ]
 
@@ -56,15 +62,19 @@ def measure(
     positions: ArrayLike | None = None,
     t_us: ArrayLike | None = None,
     settings: Mapping[str, Any] | None = None,
+    query_xy: ArrayLike | None = None,
 ) -> Result:
     """The figures of a matcher's `answers` (queries) by `truth`.
 
     `scores` (queries, items) adds recall@N; `positions` (items, 2) in metres adds the gallery spacing;
-    `t_us` (queries,) and `settings` are kept with the result. Queries that the truth knows nothing of are
-    left out and counted. Raises EvaluationError where the parts do not fit or no query is judged.
+    `t_us` (queries,), `settings` and the positions, also `query_xy` (queries, 2), are kept with the
+    result. Queries that the truth knows nothing of are left out and counted. Raises EvaluationError where
+    the parts do not fit or no query is judged.
     """
     _check(answers, truth, scores)
-    right, seen, shares, ranked = _compare_with_truth(answers, truth, scores)
+    here, there = _known(query_xy, truth.n_queries), _known(positions, truth.n_items)
+    right, true_item, shares, ranked = _compare_with_truth(answers, truth, scores, here, there)
+    seen = true_item >= 0
     accepted = answers.accepted & (answers.item >= 0)
     judged = truth.judged
     curve = precision_recall(answers.score[judged], right[judged], seen[judged], answers.item[judged] >= 0)
@@ -78,7 +88,18 @@ def measure(
     )
     times = np.full(len(judged), -1) if t_us is None else np.asarray(t_us, np.int64)
     resolved = dict(settings or {}) | {"truth": truth.rule}
-    return Result(figures, resolved, versions(), answers, times, judged, seen, right, curve, scores)
+    return Result(
+        figures, resolved, versions(), answers, times, judged, seen, right, curve, scores,
+        true_item=true_item, query_xy=here, item_xy=there,
+    )  # fmt: skip
+
+
+def sample(result: Result, images: NDArray[np.uint8], of_items: ItemImages) -> Result:
+    """The same with `Samples`: some of the query's `images` (queries, ...), and what `of_items` shows."""
+    query = choose(result.outcome)
+    true = np.full(len(query), -1) if result.true_item is None else result.true_item[query]
+    shown = pictures(np.asarray(images[query]), result.answers.item[query], true, of_items)
+    return dataclasses.replace(result, samples=Samples(query, shown))
 
 
 def compare(results: Iterable[Result | str | Path]) -> list[dict[str, Any]]:
@@ -117,20 +138,53 @@ def _check(answers: Answers, truth: Truth, scores: NDArray[np.floating[Any]] | N
 
 
 def _compare_with_truth(
-    answers: Answers, truth: Truth, scores: NDArray[np.floating[Any]] | None
-) -> tuple[Bools, Bools, Floats, Floats | None]:
-    """In one pass over the truth: (queries,) right, seen, share of right items; (queries, N, 3) hits."""
-    right, seen = np.zeros(truth.n_queries, np.bool_), np.zeros(truth.n_queries, np.bool_)
+    answers: Answers,
+    truth: Truth,
+    scores: NDArray[np.floating[Any]] | None,
+    here: Floats | None,
+    there: Floats | None,
+) -> tuple[Bools, NDArray[np.int64], Floats, Floats | None]:
+    """In one pass over the truth: (queries,) right, true item, share of right items; (queries, N, 3) hits.
+
+    `here` (queries, 2) and `there` (items, 2) are positions; the true item is the right one nearest by.
+    """
+    right, true_item = np.zeros(truth.n_queries, np.bool_), np.zeros(truth.n_queries, np.int64)
     shares = np.zeros(truth.n_queries)
     hits = np.zeros((truth.n_queries, len(RECALLS_AT), 3))
     for part, block in truth.blocks():
         items = answers.item[part]
         right[part] = block[np.arange(len(block)), items] & (items >= 0)
-        seen[part] = block.any(axis=1)
+        true_item[part] = _nearest_right(block, None if here is None else here[part], there)
         shares[part] = block.mean(axis=1)
         if scores is not None:
             hits[part] = hits_at(scores[part], block, RECALLS_AT)
-    return right, seen, shares, hits if scores is not None else None
+    return right, true_item, shares, hits if scores is not None else None
+
+
+def _nearest_right(block: Bools, here: Floats | None, there: Floats | None) -> NDArray[np.int64]:
+    """(queries,) of the right items in `block` (queries, items) the nearest, -1 where none is right.
+
+    Without positions `here` (queries, 2) and `there` (items, 2): the middle one of the right items.
+    """
+    if here is None or there is None:
+        place = np.cumsum(block, axis=1)
+        nearest = np.argmax(place > (place[:, -1:] - 1) // 2, axis=1)
+    else:
+        apart = np.hypot(here[:, 0, None] - there[:, 0], here[:, 1, None] - there[:, 1])
+        nearest = np.argmin(np.where(block & np.isfinite(apart), apart, np.inf), axis=1)
+    return np.where(block.any(axis=1), nearest, -1)
+
+
+def _known(xy: ArrayLike | None, many: int) -> Floats | None:
+    """Positions (many, 2) as they are kept: None where none is known."""
+    if xy is None:
+        return None
+    positions = np.asarray(xy, np.float64)
+    if positions.shape != (many, 2):
+        raise EvaluationError(
+            f"positions of shape {positions.shape} do not fit: wanted are {many} pairs of metres"
+        )
+    return positions if np.isfinite(positions).any() else None
 
 
 def versions() -> dict[str, str]:

@@ -13,9 +13,14 @@ from numpy.typing import NDArray
 from evplace import storage
 from evplace.errors import EvaluationError, InputError
 from evplace.evaluation._measures import CURVE, Bools, Floats
+from evplace.evaluation._samples import Samples
 from evplace.matchers import Path as Answers
 
-_MATCHES = ("query", "t_us", "item", "score", "accepted", "judged", "seen", "right")
+_MATCHES = ("query", "t_us", "item", "score", "accepted", "judged", "seen", "right", "true_item")
+
+OUTCOMES = ("right", "wrong", "missed", "unseen")
+"""What became of a query: accepted and right (TP), accepted otherwise (FP), not accepted though seen (FN),
+not accepted and unseen (TN)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,20 +47,51 @@ class Result:
     """(thresholds, 4) the columns of CURVE, from the highest threshold to the lowest."""
     scores: NDArray[np.floating[Any]] | None = field(default=None)
     """(queries, items) score rows, where they were kept."""
+    true_item: NDArray[np.int64] | None = None
+    """(queries,) the right item nearest to each query, -1 where none is right; None where it was not kept."""
+    query_xy: Floats | None = None
+    """(queries, 2) easting and northing in metres, NaN where unknown; None where none is known."""
+    item_xy: Floats | None = None
+    """(items, 2) easting and northing in metres, NaN where unknown; None where none is known."""
+    took_s: float | None = None
+    """Seconds of localising and measuring."""
+    samples: Samples | None = None
+    """Some queries with their images, to look at."""
+
+    @property
+    def error_m(self) -> Floats:
+        """(queries,) metres from each query to the item answered, accepted or not; NaN where unknown."""
+        if self.query_xy is None or self.item_xy is None:
+            return np.full(len(self.judged), np.nan)
+        apart = self.query_xy - self.item_xy[self.answers.item]
+        return np.where(self.answers.item >= 0, np.hypot(*apart.T), np.nan)
+
+    @property
+    def outcome(self) -> NDArray[np.int64]:
+        """(queries,) an index of OUTCOMES each; -1 where nothing is known of the query."""
+        accepted = self.answers.accepted & (self.answers.item >= 0)
+        kinds = [~self.judged, accepted & self.right, accepted, self.seen]
+        return np.select(kinds, [-1, 0, 1, 2], 3).astype(np.int64)
 
     def save(self, path: str | Path, overwrite: bool = False, with_scores: bool = False) -> None:
-        """A folder: result.json, matches.csv, pr_curve.npy, and pr_curve.png where matplotlib is installed.
+        """A folder: result.json, matches.csv, pr_curve.npy, and as far as they are known query_xy.npy,
+        item_xy.npy and samples.npy.
 
         `with_scores` adds scores.npy. Raises OutputError where the folder cannot be written.
         """
         with storage.new_folder(path, overwrite) as folder:
-            summary = {"figures": self.figures, "settings": self.settings, "versions": self.versions}
-            storage.write_json(folder / "result.json", summary)
+            storage.write_json(folder / "result.json", self._summary())
             _write_matches(folder / "matches.csv", self)
-            np.save(folder / "pr_curve.npy", self.curve)
-            _draw_curve(folder / "pr_curve.png", self.curve)
-            if with_scores and self.scores is not None:
-                np.save(folder / "scores.npy", self.scores)
+            arrays = {
+                "pr_curve": self.curve,
+                "query_xy": self.query_xy,
+                "item_xy": self.item_xy,
+                "samples": self.samples.images if self.samples is not None else None,
+                "scores": self.scores if with_scores else None,
+            }
+            for name, array in arrays.items():
+                if array is not None:
+                    np.save(folder / f"{name}.npy", array)
 
     @classmethod
     def load(cls, path: str | Path) -> Result:
@@ -64,53 +100,82 @@ class Result:
         try:
             summary = storage.read_json(folder / "result.json", "a result")
             curve = np.load(folder / "pr_curve.npy", allow_pickle=False).reshape(-1, len(CURVE))
-            kept = folder / "scores.npy"
-            scores = np.load(kept, mmap_mode="r", allow_pickle=False) if kept.exists() else None
             answers, columns = _read_matches(folder / "matches.csv")
-            return cls(
+            images = _kept(folder / "samples.npy")
+            samples = Samples.of(summary["samples"], images) if images is not None else None
+            result = cls(
                 summary["figures"], summary["settings"], summary["versions"], answers, **columns,
-                curve=curve, scores=scores,
+                curve=curve, scores=_kept(folder / "scores.npy", memory_mapped=True),
+                query_xy=_kept(folder / "query_xy.npy"), item_xy=_kept(folder / "item_xy.npy"),
+                took_s=summary.get("took_s"), samples=samples,
             )  # fmt: skip
+            _check_fit(result)
         except InputError as error:
             raise EvaluationError(str(error)) from error
-        except (OSError, EOFError, KeyError, ValueError) as error:
+        except (OSError, EOFError, KeyError, TypeError, ValueError) as error:
             raise EvaluationError(f"the result in {folder} is damaged ({error}): evaluate again") from error
+        return result
+
+    def _summary(self) -> dict[str, Any]:
+        """What result.json holds."""
+        summary: dict[str, Any] = {
+            "figures": self.figures,
+            "settings": self.settings,
+            "versions": self.versions,
+        }
+        if self.took_s is not None:
+            summary["took_s"] = self.took_s
+        if self.samples is not None:
+            summary["samples"] = self.samples.query.tolist()
+        return summary
+
+
+def _kept(path: Path, memory_mapped: bool = False) -> NDArray[Any] | None:
+    """The array in a file that a result may lack."""
+    if not path.exists():
+        return None
+    array: NDArray[Any] = np.load(path, mmap_mode="r" if memory_mapped else None, allow_pickle=False)
+    return array
+
+
+def _check_fit(result: Result) -> None:
+    """ValueError where the files of a folder are not of one result."""
+    queries, items = len(result.judged), result.figures["items"]
+    if len(result.answers.item) and result.answers.item.max() >= items:
+        raise ValueError(f"item {result.answers.item.max()} of {items}")
+    for array, shape in ((result.query_xy, (queries, 2)), (result.item_xy, (items, 2))):
+        if array is not None and array.shape != shape:
+            raise ValueError(f"positions of shape {array.shape} in place of {shape}")
+    if result.samples is not None and np.any(result.samples.query >= queries):
+        raise ValueError(f"samples of queries beyond the {queries}")
 
 
 def _write_matches(path: Path, result: Result) -> None:
     item, score, accepted = result.answers
     flags = [column.astype(int).tolist() for column in (result.judged, result.seen, result.right)]
     shown = ["" if np.isnan(value) else repr(value) for value in score.tolist()]
+    true_item = [""] * len(item) if result.true_item is None else result.true_item.tolist()
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(_MATCHES)
         writer.writerows(
             zip(range(len(item)), result.t_us.tolist(), item.tolist(), shown, accepted.astype(int).tolist(),
-                *flags, strict=True)
+                *flags, true_item, strict=True)
         )  # fmt: skip
 
 
 def _read_matches(path: Path) -> tuple[Answers, dict[str, NDArray[Any]]]:
     with path.open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    column = {name: [row[name] for row in rows] for name in _MATCHES}
+    column = {name: [row[name] for row in rows] for name in _MATCHES[:-1]}
     flags = {name: np.array(column[name], np.int64).astype(np.bool_) for name in ("judged", "seen", "right")}
     answers = Answers(
         np.array(column["item"], np.int64),
         np.array([text or "nan" for text in column["score"]], np.float64),
         np.array(column["accepted"], np.int64).astype(np.bool_),
     )
-    return answers, {"t_us": np.array(column["t_us"], np.int64)} | flags
-
-
-def _draw_curve(path: Path, curve: Floats) -> None:
-    """The curve as a picture, where matplotlib is installed."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError:
-        return
-    figure = Figure(figsize=(5, 4), layout="constrained")
-    axes = figure.add_subplot(xlabel="recall", ylabel="precision", xlim=(0, 1.02), ylim=(0, 1.02))
-    axes.plot(curve[:, 2], curve[:, 1], marker="." if len(curve) < 30 else None)
-    axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=120)
+    found = {"t_us": np.array(column["t_us"], np.int64)} | flags
+    true_item = [row.get("true_item") or "" for row in rows]  # not every result has this column
+    if all(true_item):
+        found["true_item"] = np.array(true_item, np.int64)
+    return answers, found

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.errors import MissingExtraError
-from evplace.evaluation import Result, measure
+from evplace.evaluation import Result, measure, sample
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 from evplace.reproduction import Drives
@@ -26,6 +26,7 @@ from evplace.settings import make
 from evplace.sweeps import SWEPT, sweep
 from evplace.training import TrainSettings, train
 from evplace.traverse import Traverse
+from evplace.trial import item_images, xy_in
 from evplace.workers import serve
 
 KINDS: dict[str, type[Cities] | type[RealSets]] = {kind.__name__: kind for kind in (Cities, RealSets)}
@@ -51,7 +52,7 @@ def _answer_group(cases: list[Case], drives: Drives, runs: Runs, say: Callable[[
         query = drives.opened(same[0].query, same[0])
         rows: NDArray[np.float32] | None = None
         for case in same:
-            rows = _answer(case, place_map, query, rows, drives, runs)
+            rows = _answer(case, place_map, query, day, rows, drives, runs)
             say(f"{case.query} {case.part} {case.scorer} {case.matcher}")
 
 
@@ -83,6 +84,7 @@ def _answer(
     case: Case,
     place_map: PlaceMap,
     query: Traverse,
+    day: Traverse,
     rows: NDArray[np.float32] | None,
     drives: Drives,
     runs: Runs,
@@ -94,12 +96,15 @@ def _answer(
     found: dict[str, Any] = {}
     for rule, truth in drives.truths(place_map, query, case).items():
         settings = {"case": case.to_dict(), "map": place_map.settings, "matcher": where.settings}
-        result = measure(path, truth, rows, place_map.items.position, query.t_us, settings)
+        positions, xy = place_map.items.position, xy_in(place_map, query)
+        result = measure(path, truth, rows, positions, query.t_us, settings, xy)
         found[rule] = {"figures": result.figures}
         if case.swept:
             found[rule]["curve"] = _curve(case, rows, query, result, truth.accepts).tolist()
         if case.keep and not found.keys() - {rule}:
-            result.save(runs.result_folder(case), overwrite=True)
+            show = item_images(place_map, query, day)
+            assert show is not None  # the map's drive lends its images
+            sample(result, query.images, show).save(runs.result_folder(case), overwrite=True)
     runs.keep(case, {"rules": found, "cpu_s": round(time.process_time() - began, 2)})
     return rows
 

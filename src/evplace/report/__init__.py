@@ -1,0 +1,47 @@
+"""Results -> one HTML page that opens without a network, and PNG plots beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from evplace.errors import MissingExtraError
+from evplace.report._found import look
+from evplace.report._page import page
+from evplace.report._plots import plots
+from evplace.storage import new_file
+
+__all__ = ["Written", "report"]
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a report left behind."""
+
+    page: Path
+    """The HTML file."""
+    plots: list[Path]
+    """The .png files beside it."""
+    remark: str | None
+    """What it went without, and what to do."""
+
+
+def report(folder: str | Path, out: str | Path | None = None, overwrite: bool = False) -> Written:
+    """Write a page of all that `folder` holds, by default as report.html in it.
+
+    `folder` is a result that `evplace evaluate` wrote, a folder of results, or one that also holds
+    table2.json, figure5.json or ablations.json. Without matplotlib there are no plots beside the page. Raises
+    InputError where there is nothing to show or something is damaged, OutputError where the page cannot be
+    written.
+    """
+    found = look(Path(folder))
+    target = Path(folder) / "report.html" if out is None else Path(out)
+    made: list[Path] = []
+    remark = None
+    with new_file(target, overwrite) as partial:
+        try:
+            made = plots(found, target)
+        except MissingExtraError as error:
+            remark = f"No plots beside this page: {error}"
+        partial.write_text(page(found, remark), "utf-8")
+    return Written(target, made, remark)

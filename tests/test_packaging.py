@@ -1,0 +1,17 @@
+"""What is installed: every file of the package that is not Python is named in the packaging."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_files_beside_the_code_are_packaged() -> None:
+    told = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    patterns = told["tool"]["setuptools"]["package-data"]["evplace"]
+    package = ROOT / "src" / "evplace"
+    packaged = {file for pattern in patterns for file in package.glob(pattern)}
+    files = {file for file in package.rglob("*") if file.is_file() and "__pycache__" not in file.parts}
+    assert {file for file in files if file.suffix not in (".py", ".pyc")} == packaged
