@@ -64,5 +64,5 @@ def test_files(tmp_path: Path) -> None:
 def test_families_are_their_folders() -> None:
     assert plugs.names("scorers") == ["cosine", "ncc", "network", "notebook", "sad", "seqslam"]
     assert plugs.load("scorers", "ncc").__name__ == "evplace.scorers.ncc"
-    with pytest.raises(SettingsError, match="known are ncc"):
+    with pytest.raises(SettingsError, match="known are cosine"):
         plugs.load("scorers", "_ncc")
