@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
-import tomllib
-from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +14,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_results import make_result, write_run
 
-import evplace
 from evplace.report._found import Curve, Found, PaperCurve, Sheet, look
 from evplace.report._html import Html, join, tag
 from evplace.report._page import _inline_json, page
@@ -163,13 +160,3 @@ def test_thinned_curves_stay_close_to_the_exact_ones() -> None:
     far = np.abs(exact[:, None] - kept[None]).max(axis=2).min(axis=1)
     assert len(kept) < len(exact)
     assert far.max() < 0.002
-
-
-def test_the_pages_files_are_in_the_package() -> None:
-    root = Path(evplace.__file__).parent
-    project = tomllib.loads((root.parents[1] / "pyproject.toml").read_text())
-    patterns = project["tool"]["setuptools"]["package-data"]["evplace"]
-    files = [str(path.relative_to(root)) for path in root.rglob("*") if path.is_file()]
-    others = [name for name in files if not name.endswith((".py", ".pyc", ".nbi", ".nbc"))]
-    assert {"report/page.html", "report/page.css", "report/page.js", "report/plots.js"} <= set(others)
-    assert [name for name in others if not any(fnmatch(name, pattern) for pattern in patterns)] == []
