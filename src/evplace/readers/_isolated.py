@@ -30,6 +30,8 @@ MEMORY = 4 << 30
 """Bytes of address space that the child may take, where the system can limit it; a block needs far less."""
 SLICE = 1 << 19
 """Events that a message carries at most."""
+PIPE = 1 << 20
+"""Bytes that the pipe holds, where the system lets it be set: the two processes then rarely wait."""
 _FRAME = struct.Struct("<cqq")
 """Kind (H header, B block, E end), then two numbers: bytes and 0, or events and untimed events."""
 
@@ -60,6 +62,7 @@ class _Child:
             stdout=subprocess.PIPE,
             stdin=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            pipesize=PIPE if sys.platform == "linux" else -1,
         )
 
     def messages(self) -> Iterator[dict[str, Any] | Block]:
