@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from evplace.readers._clock import clock, unwrap
 from evplace.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
-from evplace.readers._source import Block, Hints, Source
+from evplace.readers._source import Block, Hints, Source, joined
 
 ABOUT = "Prophesee raw file, EVT 3.0"
 WORDS = 1 << 18
-"""Words decoded at a time; a word gives 12 events at most."""
+"""Words decoded at a time."""
+MOST = 12
+"""Events that a word gives at most."""
 
 
 def matches(path: Path, head: bytes) -> bool:
@@ -36,7 +38,7 @@ def read(path: Path, hints: Hints) -> Source:
 def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:
     decoder = Decoder(shift_us)
     for part in words(path, start, "<u2", WORDS):
-        yield decoder.decode(part)
+        yield from decoder.parts(part)
 
 
 class Decoder:
@@ -50,28 +52,21 @@ class Decoder:
 
     def decode(self, run: NDArray[np.uint16]) -> Block:
         """The events of `run`, in the order of the words."""
-        room = _events_in(run)
-        t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
-        p = np.empty(room, np.bool_)
-        self._state[5] = 0
-        count = _decode(run, self._state, self._clock, self._shift_us, t_us, x, y, p)
-        return Block(t_us[:count], x[:count], y[:count], p[:count], int(self._state[5]))
+        return joined(list(self.parts(run)))
 
-
-@njit(cache=True)
-def _events_in(run: NDArray[np.uint16]) -> int:
-    """Events that the words give, whether or not their time is known."""
-    count = 0
-    for word in run:
-        kind = word >> 12
-        if kind == 0x2:
-            count += 1
-        elif kind == 0x4 or kind == 0x5:
-            bits = word & (0xFFF if kind == 0x4 else 0xFF)
-            while bits:
-                bits &= bits - 1
-                count += 1
-    return count
+    def parts(self, run: NDArray[np.uint16]) -> Iterator[Block]:
+        """The events of `run` in one block, or in several where a word gives more than one event."""
+        used = 0
+        while True:
+            room = len(run) - used + MOST
+            t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
+            p = np.empty(room, np.bool_)
+            self._state[5] = 0
+            count, more = _decode(run[used:], self._state, self._clock, self._shift_us, t_us, x, y, p)
+            yield Block(t_us[:count], x[:count], y[:count], p[:count], int(self._state[5]))
+            used += more
+            if used == len(run):
+                return
 
 
 @njit(cache=True)
@@ -84,26 +79,25 @@ def _decode(
     x: NDArray[np.uint16],
     y: NDArray[np.uint16],
     p: NDArray[np.bool_],
-) -> int:
+) -> tuple[int, int]:
+    """Fill the arrays; return the events and the words used, all unless the arrays are full before."""
     time, row, base, polarity, timed = state[0], state[1], state[2], state[3] != 0, state[4] != 0
-    count, untimed = 0, 0
-    for word in run:
+    count, untimed, i, last = 0, 0, 0, len(t_us) - MOST
+    while i < len(run) and count <= last:
+        word = run[i]
+        i += 1
         kind, value = word >> 12, np.int64(word & 0xFFF)
         if kind == 0x2:  # one event
             if timed:
-                t_us[count], x[count], y[count], p[count] = (
-                    shift_us + time,
-                    value & 0x7FF,
-                    row,
-                    value & 0x800 != 0,
-                )
+                t_us[count], x[count], y[count] = shift_us + time, value & 0x7FF, row
+                p[count] = value & 0x800 != 0
                 count += 1
             else:
                 untimed += 1
-        elif kind == 0x0:
-            row = value & 0x7FF
         elif kind == 0x6:
             time = (time & ~np.int64(0xFFF)) | value
+        elif kind == 0x0:
+            row = value & 0x7FF
         elif kind == 0x4 or kind == 0x5:  # up to 12, or 8, neighbouring columns
             width = 12 if kind == 0x4 else 8
             for bit in range(width):
@@ -124,4 +118,4 @@ def _decode(
             if high != time >> 12:  # a repeated one leaves the low bits alone
                 time = high << 12
     state[0], state[1], state[2], state[3], state[4], state[5] = time, row, base, polarity, timed, untimed
-    return count
+    return count, i
