@@ -45,6 +45,12 @@ def note(text: str) -> None:
     print(f"evplace: {text}", file=sys.stderr)
 
 
+def note_guesses(notes: object) -> None:
+    """What was guessed of a recording, a remark each; `notes` are its own or those that a traverse kept."""
+    for guess in notes if isinstance(notes, list) else []:
+        note(str(guess))
+
+
 @contextlib.contextmanager
 def progress(what: str) -> Iterator[Show]:
     """A bar with rate and time left, on standard error; call what it gives with (done, total, remark)."""

@@ -63,9 +63,9 @@ class Result:
         folder = Path(path)
         try:
             summary = storage.read_json(folder / "result.json", "a result")
-            curve = np.load(folder / "pr_curve.npy", allow_pickle=False).reshape(-1, len(CURVE))
+            curve = storage.read_array(folder / "pr_curve.npy", "a result").reshape(-1, len(CURVE))
             kept = folder / "scores.npy"
-            scores = np.load(kept, mmap_mode="r", allow_pickle=False) if kept.exists() else None
+            scores = storage.read_array(kept, "a result", memory_mapped=True) if kept.exists() else None
             answers, columns = _read_matches(folder / "matches.csv")
             return cls(
                 summary["figures"], summary["settings"], summary["versions"], answers, **columns,
