@@ -62,6 +62,7 @@ def main(reader: str, file: str, kind: str, seed: int, first: int, count: int) -
     data, bad, size = path.read_bytes(), path.with_name(f"damaged{path.suffix}"), (240, 180)
     for number in range(first, count):
         print(number, flush=True)
+        _isolated._limit_work()
         bad.write_bytes(damaged(data, kind, seed, number, count))
         packets = []
         with contextlib.suppress(EvplaceError):
