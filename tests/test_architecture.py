@@ -10,10 +10,10 @@ from pathlib import Path
 SRC = Path(__file__).parents[1] / "src" / "evplace"
 
 ROOMS = (
-    "errors plugs storage settings events readers writers cleaning windows resampling representations images "
-    "stream frames tracks spacing places truth traverse sheets capture datasets simulators city placemap "
-    "network network_onnx checkpoint training distances seqslam_images scorers matchers sweeps localizer "
-    "evaluation trial charts cli"
+    "errors plugs storage settings workers events readers writers cleaning windows resampling "
+    "representations tones images stream frames tracks spacing places truth traverse sheets simulators "
+    "datasets capture city placemap network network_onnx augmentation checkpoint training distances "
+    "seqslam_images scorers matchers sweeps localizer evaluation trial charts reproduction cli"
 ).split()
 """In the order of the data: a room imports only rooms before it, or files of its own."""
 

@@ -160,3 +160,12 @@ def test_a_colour_frame_is_cropped_and_resized_only() -> None:
 def test_a_frame_that_is_no_image_is_refused() -> None:
     with pytest.raises(TraverseError, match="float64"):
         frame_image(np.zeros((4, 4)))  # type: ignore[arg-type]
+
+
+def test_the_blur_can_come_last_as_in_the_notebook() -> None:
+    events = random_events((320, 240))
+    plain = event_image(events, ImageSettings(blur=False))
+    last = event_image(events, ImageSettings(blur_last=True))
+    np.testing.assert_allclose(last, plain_blur(plain.astype(np.float64)), atol=1e-5)
+    assert not np.allclose(last, event_image(events), atol=1e-3)
+    np.testing.assert_array_equal(event_image(events, ImageSettings(blur=False, blur_last=True)), plain)

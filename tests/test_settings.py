@@ -62,7 +62,7 @@ def test_files(tmp_path: Path) -> None:
 
 
 def test_families_are_their_folders() -> None:
-    assert plugs.names("scorers") == ["ncc", "network", "sad"]
+    assert plugs.names("scorers") == ["cosine", "ncc", "network", "notebook", "sad", "seqslam"]
     assert plugs.load("scorers", "ncc").__name__ == "evplace.scorers.ncc"
     with pytest.raises(SettingsError, match="known are ncc"):
         plugs.load("scorers", "_ncc")

@@ -1,4 +1,4 @@
-"""Recordings and folders of images -> traverses."""
+"""Recordings, videos, folders of images and data sets -> traverses."""
 
 from __future__ import annotations
 
@@ -6,22 +6,30 @@ import dataclasses
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace import datasets
 from evplace import settings as settings_room
 from evplace.cleaning import CleaningSettings, MaskSource, pixel_mask
-from evplace.errors import DamagedRecordingError, TrackError, TraverseError
+from evplace.datasets import Drive
+from evplace.errors import DamagedRecordingError, SettingsError, TrackError, TraverseError
 from evplace.events import Events, Size
-from evplace.frames import Frames, is_frames, open_frames
+from evplace.frames import is_frames, open_frames
 from evplace.images import ImageSettings, frame_image
-from evplace.readers import Recording, open_recording
+from evplace.readers import Recording, is_recording, open_recording
+from evplace.simulators.frames import Film, film_of, is_video, open_film
+from evplace.simulators.recording import SimulatedRecording
 from evplace.spacing import Spacer, SpacingSettings
 from evplace.stream import EventImages, images_of
 from evplace.tracks import Track, open_track
 from evplace.traverse import Traverse, TraverseWriter
 from evplace.windows import WindowSettings
+
+Kind = Literal["events", "frames"]
+"""Event images, simulated where there are no events; or the camera's own images."""
 
 
 def open_traverse(
@@ -34,8 +42,16 @@ def open_traverse(
     cleaning: CleaningSettings | None = None,
     spacing: SpacingSettings | None = None,
     mask: MaskSource | None = None,
+    drive: str | None = None,
+    dataset: str | None = None,
+    kind: Kind | None = None,
 ) -> Traverse:
-    """A traverse folder, an event recording or a folder of images, whichever `path` is.
+    """A traverse folder, an event recording, a video, a folder of images or a data set, as `path` is.
+
+    `drive` names a drive of a data set, which is recognised by its layout or named by `dataset`; it brings
+    its own track, mask and settings, unless others are given. `kind` is "events" (simulated where there are
+    only images: the default for videos and for data sets of films) or "frames" (the camera's own images, in
+    colour where they have colours).
 
     Recordings and images are turned into images in memory; for long ones, write a traverse folder with
     `evplace images` first. `track` is a GPS log, or a Track; `size` and `time_unit` are
@@ -51,7 +67,8 @@ def open_traverse(
     with tempfile.TemporaryDirectory(prefix="evplace-") as folder:
         writer = TraverseWriter(Path(folder), {})
         try:
-            record(path, writer, track, windows, images, size, time_unit, cleaning, spacing, mask)
+            source = open_source(path, size, time_unit, drive, dataset)
+            record(source, writer, track, windows, images, cleaning, spacing, mask, kind)
             writer.close()
         finally:
             writer.discard()
@@ -59,30 +76,62 @@ def open_traverse(
         return dataclasses.replace(found, images=np.array(found.images))
 
 
-def record(
+def open_source(
     path: str | Path,
+    size: Size | None = None,
+    time_unit: str | None = None,
+    drive: str | None = None,
+    dataset: str | None = None,
+    listing: str | Path | None = None,
+    fps: float = 30.0,
+) -> Drive:
+    """What `path` holds, as a drive: see `open_traverse`; `listing` and `fps` as in `open_frames`.
+
+    `size` and `time_unit` are for a recording, `drive` and `dataset` for a data set's folder; SettingsError
+    where both are given.
+    """
+    place = Path(path)
+    if drive is not None or dataset is not None:
+        if size is not None or time_unit is not None:
+            raise SettingsError("a data set knows its sensor's size and its unit of time: leave these out")
+        return datasets.open_drive(place, drive, dataset)
+    if is_frames(place):
+        return Drive(film_of(place, open_frames(place, listing, fps)))
+    if is_video(place):
+        return Drive(open_film(place), simulate=True)
+    if place.is_dir() and not is_recording(place):
+        if datasets.matching(place):
+            return datasets.open_drive(place)
+        if is_frames(place / "images"):
+            return Drive(film_of(place / "images", open_frames(place / "images", listing, fps)))
+    return Drive(open_recording(place, size, time_unit=time_unit))
+
+
+def record(
+    drive: Drive,
     writer: TraverseWriter,
     track: str | Path | Track | None = None,
     windows: WindowSettings | None = None,
     images: ImageSettings | None = None,
-    size: Size | None = None,
-    time_unit: str | None = None,
     cleaning: CleaningSettings | None = None,
     spacing: SpacingSettings | None = None,
     mask: MaskSource | None = None,
+    kind: Kind | None = None,
 ) -> str | None:
-    """Write the images of an event recording or of a folder of images; returns what broke off, if any."""
-    positions = _opened(track)
-    if is_frames(Path(path)):
-        check_uncleaned(path, cleaning, mask)
-        record_frames(open_frames(path), path, writer, images, positions, spacing)
+    """Write the images of a drive; what is not given is the drive's own. Returns what broke off, if any."""
+    positions = drive.track if track is None else _opened(track)
+    windows, images = windows or drive.windows, images or drive.images
+    mask = drive.mask if mask is None else mask
+    source = _as(kind, drive)
+    if isinstance(source, Film):
+        check_uncleaned(source.path, cleaning, mask)
+        record_frames(source, writer, images, positions, spacing)
         return None
-    recording = open_recording(path, size, time_unit=time_unit)
-    return record_events(recording, writer, windows, images, positions, cleaning, spacing, mask)
+    return record_events(source, writer, windows, images, positions, cleaning, spacing, mask)
 
 
 def record_events(
-    recording: Recording,
+    recording: Recording | SimulatedRecording,
     writer: TraverseWriter,
     windows: WindowSettings | None = None,
     images: ImageSettings | None = None,
@@ -116,12 +165,13 @@ def record_events(
         "left_out": spacer.left_out,
         "fault": fault,
     }
+    if isinstance(recording, SimulatedRecording):
+        writer.info["simulated"] = settings_room.to_dict(recording.sensor) | {"seed": recording.seed}
     return fault
 
 
 def record_frames(
-    frames: Frames,
-    source: str | Path,
+    film: Film,
     writer: TraverseWriter,
     images: ImageSettings | None = None,
     track: Track | None = None,
@@ -130,17 +180,19 @@ def record_frames(
     """Write camera images, cropped and resized as `images` says."""
     images, spacer = images or ImageSettings(), Spacer(spacing, track)
     shape = None
-    for file, frame, t_us in zip(frames.files, frames, frames.t_us, strict=True):
+    for n, (t_us, frame) in enumerate(film.images()):
         shape = shape or frame.shape
         if frame.shape != shape:
-            raise TraverseError(f"{file} is {frame.shape}, the images before it are {shape}: make them alike")
-        if spacer.keeps(int(t_us), -1):
-            writer.add(frame_image(frame, images), int(t_us))
+            raise TraverseError(
+                f"{film.name(n)} is {frame.shape}, the images before it are {shape}: make them alike"
+            )
+        if spacer.keeps(t_us, -1):
+            writer.add(frame_image(frame, images), t_us)
     writer.track = _aligned(track, np.array(writer.t_us, np.int64))
     writer.info |= {
-        "source": str(source),
+        "source": str(film.path),
         "input": "frames",
-        "timed": frames.timed,
+        "timed": film.timed,
         "images": settings_room.to_dict(images),
         "spacing": settings_room.to_dict(spacer.settings),
         "left_out": spacer.left_out,
@@ -175,6 +227,20 @@ def check_uncleaned(path: str | Path, cleaning: CleaningSettings | None, mask: M
         raise TraverseError(f"{path} holds camera images, which have no events to clean: leave that out")
 
 
+def _as(kind: Kind | None, drive: Drive) -> Recording | SimulatedRecording | Film:
+    """What is recorded of a drive: its events, simulated ones, or its images."""
+    if isinstance(drive.source, Recording):
+        if kind == "frames":
+            raise TraverseError(
+                f"{drive.source.path} is an event recording: it holds no camera images to keep"
+            )
+        return drive.source
+    if kind == "events" and drive.simulate is None:
+        raise TraverseError(f"the images in {drive.source.path} are no film: no events can be simulated")
+    simulated = kind == "events" or (kind is None and drive.simulate)
+    return SimulatedRecording(drive.source) if simulated else drive.source
+
+
 def _opened(track: str | Path | Track | None) -> Track | None:
     return open_track(track) if isinstance(track, str | Path) else track
 
@@ -199,7 +265,7 @@ def _seconds(t_us: NDArray[np.int64]) -> str:
 class _GoodPart:
     """A recording's packets up to where it broke off; what broke it off is kept in `fault`."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Recording | SimulatedRecording) -> None:
         self._recording = recording
         self.fault: str | None = None
 

@@ -7,6 +7,7 @@ EvplaceError
 │   ├── RecordingError       an event recording
 │   │   └── DamagedRecordingError   the good part was delivered, then the data broke off
 │   ├── TrackError           a GPS log or positions
+│   ├── DatasetError        a folder of a data set: of no known layout, or a part of it is missing
 │   ├── TraverseError        a traverse folder, or images and times that do not fit
 │   ├── PlaceMapError        a map: wrong checksum, made with other settings, not a map
 │   ├── ScoresError          score rows that a matcher cannot use
@@ -51,6 +52,10 @@ class DamagedRecordingError(RecordingError):
 
 class TrackError(InputError):
     """A GPS log or a set of positions cannot be used."""
+
+
+class DatasetError(InputError):
+    """A folder of a data set is of no known layout, or a part of it is missing."""
 
 
 class TraverseError(InputError):

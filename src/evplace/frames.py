@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,52 +18,6 @@ from numpy.typing import NDArray
 from evplace.errors import TraverseError
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
-
-
-@dataclass(frozen=True)
-class Frames:
-    """Images on disk, in order."""
-
-    files: tuple[Path, ...]
-    """The image files."""
-    t_us: NDArray[np.int64]
-    """(n,) times in microseconds, increasing."""
-    timed: bool
-    """Whether the times were given, not made up from a rate."""
-
-    def __len__(self) -> int:
-        return len(self.files)
-
-    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
-        """Each image as uint8 (H, W), or (H, W, 3) where it has colours."""
-        return (read_image(file) for file in self.files)
-
-
-def is_frames(path: Path) -> bool:
-    """Whether `path` is a folder that holds images."""
-    return path.is_dir() and any(file.suffix.lower() in SUFFIXES for file in path.iterdir())
-
-
-def open_frames(path: str | Path, listing: str | Path | None = None, fps: float = 30.0) -> Frames:
-    """The images of a folder.
-
-    `listing` is a .csv or .txt with a file name in the first column of each line: only those are taken, in
-    its order. Raises TraverseError for a folder without images, or for times that do not fit.
-    """
-    folder = Path(path)
-    if not folder.is_dir():
-        raise TraverseError(f"{folder} is no folder of images")
-    files = _listed(folder, Path(listing)) if listing else _found(folder)
-    if not files:
-        raise TraverseError(f"{folder} holds no images: known are {', '.join(SUFFIXES)}")
-    times = folder / "timestamps.txt"
-    if not times.exists():
-        times = folder.parent / "timestamps.txt"
-    if times.exists():
-        return Frames(tuple(files), _times(times, len(files)), True)
-    if fps <= 0:
-        raise TraverseError(f"images without times need a rate above 0, not {fps} images a second")
-    return Frames(tuple(files), np.arange(len(files), dtype=np.int64) * 1_000_000 // round(fps), False)
 
 
 def read_image(file: Path) -> NDArray[np.uint8]:
@@ -80,10 +34,58 @@ def read_image(file: Path) -> NDArray[np.uint8]:
         raise TraverseError(f"cannot read the image {file}: {error}") from error
 
 
-def _found(folder: Path) -> list[Path]:
-    """Image files in the order of the numbers in their names."""
+@dataclass(frozen=True)
+class Frames:
+    """Images on disk, in order."""
+
+    files: tuple[Path, ...]
+    """The image files."""
+    t_us: NDArray[np.int64]
+    """(n,) times in microseconds, increasing."""
+    timed: bool
+    """Whether the times were given, not made up from a rate."""
+    read: Callable[[Path], NDArray[np.uint8]] = read_image
+    """How a file becomes an image: data sets whose files are raw sensor data have their own way."""
+
+    def __len__(self) -> int:
+        return len(self.files)
+
+    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
+        """Each image as uint8 (H, W), or (H, W, 3) where it has colours."""
+        return (self.read(file) for file in self.files)
+
+
+def is_frames(path: Path) -> bool:
+    """Whether `path` is a folder that holds images."""
+    return path.is_dir() and any(file.suffix.lower() in SUFFIXES for file in path.iterdir())
+
+
+def image_files(folder: Path) -> list[Path]:
+    """The image files of a folder in the order of the numbers in their names."""
     files = [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
     return sorted(files, key=lambda file: [int(n) for n in re.findall(r"\d+", file.stem)] + [0])
+
+
+def open_frames(path: str | Path, listing: str | Path | None = None, fps: float = 30.0) -> Frames:
+    """The images of a folder.
+
+    `listing` is a .csv or .txt with a file name in the first column of each line: only those are taken, in
+    its order. Raises TraverseError for a folder without images, or for times that do not fit.
+    """
+    folder = Path(path)
+    if not folder.is_dir():
+        raise TraverseError(f"{folder} is no folder of images")
+    files = _listed(folder, Path(listing)) if listing else image_files(folder)
+    if not files:
+        raise TraverseError(f"{folder} holds no images: known are {', '.join(SUFFIXES)}")
+    times = folder / "timestamps.txt"
+    if not times.exists():
+        times = folder.parent / "timestamps.txt"
+    if times.exists():
+        return Frames(tuple(files), _times(times, len(files)), True)
+    if fps <= 0:
+        raise TraverseError(f"images without times need a rate above 0, not {fps} images a second")
+    return Frames(tuple(files), np.floor(np.arange(len(files)) * 1_000_000 / fps).astype(np.int64), False)
 
 
 def _listed(folder: Path, listing: Path) -> list[Path]:

@@ -20,6 +20,7 @@ from evplace.errors import SettingsError, TraverseError
 from evplace.events import Events, Size
 from evplace.representations import Representation
 from evplace.resampling import Resampler, Resize, axis_map
+from evplace.tones import Tone, toned
 
 KINDS = ("binary", "polarity", "count", "time-surface", "voxel")
 
@@ -35,7 +36,9 @@ class ImageSettings:
     height: int = 90
     """Rows of the image (paper: 90)."""
     blur: bool = True
-    """Blur the event image 3x3 at the sensor's size (paper: yes)."""
+    """Blur the event image 3x3 (paper: yes)."""
+    blur_last: bool = False
+    """Blur after crop and resize, as the author's notebook does (paper: before)."""
     crop_bottom: float = 0.25
     """Share of rows removed at the bottom before the resize (paper: a quarter)."""
     resize: Resize = "area"
@@ -46,6 +49,8 @@ class ImageSettings:
     """Decay time of time-surface in milliseconds (ours: about one window)."""
     bins: int = 5
     """Time bins of voxel (ours)."""
+    tone: Tone = "plain"
+    """For camera images: plain (paper), normalised brightness and contrast, or edges (ours)."""
 
     def __post_init__(self) -> None:
         if self.representation not in KINDS:
@@ -77,7 +82,8 @@ class Imager:
         self.settings = settings or ImageSettings()
         self.size = size
         self._grid = _representation(size, self.settings)
-        self._resampler = _resampler(size, self.settings, self.settings.blur)
+        self._resampler = _resampler(size, self.settings, self.settings.blur and not self.settings.blur_last)
+        self._blur = _blur_of_images(self.settings)
 
     def add(self, events: Events) -> None:
         """Take events of the open window.
@@ -94,6 +100,8 @@ class Imager:
         """As `image`, as float32 in [0, 1] before the rounding to 256 steps."""
         layers = [_resampled(self._resampler, grid) for grid in self._grid.channels(t_us)]
         self._grid.clear()
+        if self._blur is not None:
+            layers = [self._blur.values(layer) for layer in layers]
         return layers[0] if len(layers) == 1 else np.stack(layers, axis=-1)
 
 
@@ -105,7 +113,10 @@ def event_image(events: Events, settings: ImageSettings | None = None) -> NDArra
 
 
 def frame_image(frame: NDArray[np.uint8], settings: ImageSettings | None = None) -> NDArray[np.uint8]:
-    """A camera's frame (H, W) or (H, W, 3), cropped and resized without blur: the paper's colour input."""
+    """A camera's frame (H, W) or (H, W, 3), cropped and resized without blur: the paper's colour input.
+
+    It gets the settings' tone; edges have no colours.
+    """
     settings = settings or ImageSettings()
     if frame.ndim not in (2, 3) or frame.dtype != np.uint8 or 0 in frame.shape:
         raise TraverseError(
@@ -116,7 +127,9 @@ def frame_image(frame: NDArray[np.uint8], settings: ImageSettings | None = None)
     resampler = _resampler((frame.shape[1], frame.shape[0]), settings, blur=False)
     grids = np.moveaxis(layers, -1, 0).astype(np.float32) / np.float32(255)
     small = [_to_bytes(resampler.values(np.ascontiguousarray(grid))) for grid in grids]
-    return small[0] if frame.ndim == 2 else np.stack(small, axis=-1)
+    image = small[0] if frame.ndim == 2 else np.stack(small, axis=-1)
+    changed: NDArray[np.uint8] = toned(image[None], settings.tone)[0]
+    return changed
 
 
 def _resampler(size: Size, settings: ImageSettings, blur: bool) -> Resampler:
@@ -126,6 +139,17 @@ def _resampler(size: Size, settings: ImageSettings, blur: bool) -> Resampler:
         raise SettingsError(f"'crop_bottom' {settings.crop_bottom} leaves nothing of {height} rows")
     rows = axis_map(height, kept, settings.height, blur, settings.resize)
     return Resampler(rows, axis_map(width, width, settings.width, blur, settings.resize))
+
+
+def _blur_of_images(settings: ImageSettings) -> Resampler | None:
+    """What blurs the small image, where it is blurred last."""
+    if not (settings.blur and settings.blur_last):
+        return None
+    rows, columns = settings.height, settings.width
+    return Resampler(
+        axis_map(rows, rows, rows, True, settings.resize),
+        axis_map(columns, columns, columns, True, settings.resize),
+    )
 
 
 def _representation(size: Size, settings: ImageSettings) -> Representation:

@@ -126,18 +126,19 @@ class Localizer:
             )
         return self.scorer.rows(images)
 
-    def path(self, traverse: Traverse) -> tuple[Path, Rows]:
+    def path(self, traverse: Traverse, rows: Rows | None = None) -> tuple[Path, Rows]:
         """A whole traverse in hindsight: one answer an image, and the score rows (n, items).
 
-        Images without events are answered with -1, and their rows are zero. This localizer forgets what it
-        had seen before.
+        Images without events are answered with -1, and their rows are zero. `rows` are what another
+        localizer of this map gave for this traverse, so that they need not be scored again. This localizer
+        forgets what it had seen before.
         """
         self.reset()
         filled = np.flatnonzero(traverse.counts != 0)
-        rows = np.zeros((len(traverse), len(self.map.items)), np.float32)
-        rows[filled] = self.rows(np.asarray(traverse.images[filled]))
-        for row in rows[filled]:
-            self._matcher.step(row)
+        if rows is None:
+            rows = np.zeros((len(traverse), len(self.map.items)), np.float32)
+            rows[filled] = self.rows(np.asarray(traverse.images[filled]))
+        self._matcher.extend(rows[filled])
         found = self._matcher.path()
         item = np.full(len(traverse), -1, np.int64)
         score = np.full(len(traverse), np.nan)

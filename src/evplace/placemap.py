@@ -44,7 +44,7 @@ class PlaceMap:
     """A learned route."""
 
     scorer: str
-    """Which scorer reads it: network, sad or ncc."""
+    """Which scorer reads it: network, ncc, ..."""
     places: Places
     """The places and the rule of what counts as the same place."""
     items: Items
@@ -60,6 +60,11 @@ class PlaceMap:
     """The trained network's weights."""
     references: NDArray[np.uint8] | None = None
     """(items, h, w) or (items, h, w, C): the reference images of image scorers."""
+
+    @property
+    def items_are_places(self) -> bool:
+        """Whether a score row has one entry a place (a network), not one a reference image."""
+        return self.references is None
 
     @property
     def image_shape(self) -> tuple[int, ...]:

@@ -68,11 +68,16 @@ def from_toml(path: Path) -> dict[str, Any]:
 
 
 def _as(hint: Any, value: object, key: str) -> object:
-    """`value` as the type `hint`; an int is a fine float, a list is a fine tuple."""
+    """`value` as the type `hint`; an int is a fine float, a list is a fine tuple, a table is a dict."""
     options = getattr(hint, "__args__", ()) if not isinstance(hint, type) else ()
     origin = getattr(hint, "__origin__", None)
     if origin is tuple and isinstance(value, list | tuple):
         return tuple(value)
+    if isinstance(value, Mapping) and dict in (
+        origin,
+        *(getattr(one, "__origin__", None) for one in options),
+    ):
+        return dict(value)
     if hint is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     allowed = tuple(option for option in (options or (hint,)) if isinstance(option, type))

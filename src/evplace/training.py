@@ -50,6 +50,8 @@ class TrainSettings:
     """If above 0, this many passes over all images in place of `steps`."""
     seed: int = 0
     """Draws the first weights and the order of the images."""
+    augment: Literal["none", "light"] = "none"
+    """light: each image of a batch in another light (ours; see `augmentation`). For camera images."""
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
     """auto takes bfloat16 where the processor has it: with channels-last 2.4 times plain float32."""
 
@@ -72,6 +74,8 @@ PRESETS = {
 
 KEPT = ("source", "input", "sensor", "windows", "images", "cleaning", "spacing")
 """What a map keeps of how its traverse was made."""
+TRAINED = ("network", "notebook")
+"""Scorers whose map is a trained network; to all others the images themselves are the map."""
 
 
 def train(
@@ -86,9 +90,10 @@ def train(
 ) -> PlaceMap:
     """Learn the map of `places` from the traverse `day`.
 
-    `scorer` is network (trained), or sad or ncc (the images themselves are the map); `values` are fields of
-    TrainSettings, over those of `settings`. With `checkpoint`, a file name, training goes on where a killed
-    run of the same settings and images stopped. Raises TraverseError where no image has a place.
+    `scorer` is network (trained), or one such as ncc, to which the images themselves are the map; `values`
+    are fields of TrainSettings, over those of `settings`. With `checkpoint`, a file name, training goes on
+    where a killed run of the same settings and images stopped. Raises TraverseError where no image has a
+    place.
     """
     settings = settings_room.make(TrainSettings, values, settings)
     labels = places.label(places.where(day.xy))
@@ -103,7 +108,7 @@ def train(
     }
     heading = day.track.heading_deg if day.track is not None else np.full(len(day), np.nan)
     drive = np.column_stack([day.xy, heading])[used]
-    if scorer != "network":
+    if scorer not in TRAINED:
         items = Items(labels[used], drive[:, :2], drive[:, 2])
         return PlaceMap(scorer, places, items, drive, description, references=np.asarray(day.images[used]))
     from evplace.network_onnx import onnx_bytes
@@ -111,7 +116,7 @@ def train(
     weights = train_network(day.images, labels, used, places.n, settings, progress, checkpoint)
     description["train"] = settings_room.to_dict(settings)
     network = onnx_bytes(weights, image_shape(day.images), settings.last_relu)
-    return PlaceMap("network", places, _place_items(places), drive, description, network, weights)
+    return PlaceMap(scorer, places, _place_items(places), drive, description, network, weights)
 
 
 def train_network(
@@ -127,6 +132,7 @@ def train_network(
     import torch
     from torch.nn.functional import cross_entropy
 
+    from evplace.augmentation import in_another_light
     from evplace.checkpoint import Checkpoint, fingerprint
     from evplace.network import Network, NetworkSettings, to_input, weights_of
 
@@ -144,11 +150,14 @@ def train_network(
     for step, batch in enumerate(
         batches(len(chosen), settings.batch, settings.seed, first, steps), first + 1
     ):
-        torch.manual_seed(settings.seed + step)  # dropout, too, depends on the step alone
+        torch.manual_seed(settings.seed + step)  # what is drawn, too, depends on the step alone
         index = np.sort(chosen[batch])
         target = torch.from_numpy(labels[index]).to(device)
+        inputs = to_input(images[index], device)
+        if settings.augment == "light":
+            inputs = in_another_light(inputs)
         with torch.autocast(device, torch.bfloat16, enabled=_bfloat16(settings, device)):
-            loss = cross_entropy(network(to_input(images[index], device)), target)
+            loss = cross_entropy(network(inputs), target)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         optimiser.step()

@@ -15,7 +15,7 @@ from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns
 from evplace.tracks import Track
 from evplace.traverse import Traverse
-from evplace.truth import Truth, by_cells, by_places, by_view, only_views
+from evplace.truth import Truth, by_cells, by_places, only_views
 
 Rule = Literal["places", "view"]
 MARGIN_M = 1000.0
@@ -27,7 +27,7 @@ def evaluate(where: Localizer, query: Traverse, truth: Truth | None = None, rule
 
     Without `truth`, the positions are: by `rule` places, an answer is right in the query's cell or one of its
     eight neighbours (paper, section 3.4), and a query is seen where the map has any such cell. By view it is
-    also needed that the map holds a reference within 20 m that looks within 34 degrees the same way.
+    seen only where the map holds a reference within 20 m that looks within 34 degrees the same way.
     Raises EvaluationError where query and map share no ground, or the truth does not fit.
     """
     truth = truth or truth_of(where.map, query, rule)
@@ -49,15 +49,13 @@ def truth_of(place_map: PlaceMap, query: Traverse, rule: Rule = "places") -> Tru
     if track is None:
         raise EvaluationError("the query has no positions: give its track, or the truth as a matrix")
     _check_overlap(place_map, track)
-    if rule == "view" and place_map.scorer != "network":
-        return by_view(track, _references(place_map))
     truth = _by_place(place_map, place_map.places, track)
     return only_views(truth, track, _references(place_map)) if rule == "view" else truth
 
 
 def _by_place(place_map: PlaceMap, places: object, track: Track) -> Truth:
     assert isinstance(places, PlaceGrid)
-    if place_map.scorer == "network":
+    if place_map.items_are_places:
         return by_places(places, track.xy)
     return by_cells(track.xy, place_map.items.position, places.cell_m, places.origin)
 
@@ -65,7 +63,7 @@ def _by_place(place_map: PlaceMap, places: object, track: Track) -> Truth:
 def _by_runs(place_map: PlaceMap, places: PlaceRuns, query: Traverse) -> Truth:
     """Query and map in step: place i of the query is place i of the map."""
     truth = by_places(places, query.xy)
-    if place_map.scorer == "network":
+    if place_map.items_are_places:
         return truth
     columns = place_map.items.place
     return dataclasses.replace(truth, block=lambda part: truth.block(part)[:, columns], n_items=len(columns))

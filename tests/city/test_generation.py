@@ -16,13 +16,13 @@ import pytest
 from PIL import Image
 
 from evplace.city import CitySettings, Film, Progress, build_town, generate, moving_preview, preview
-from evplace.city.generation import _environment
 from evplace.city.recording import record_drive
 from evplace.errors import OutputError, SettingsError
 from evplace.events import Events
 from evplace.readers import open_recording
 from evplace.settings import to_dict
 from evplace.traverse import Traverse
+from evplace.workers import environment
 
 SMALL = CitySettings(
     conditions=("day", "night"),
@@ -91,7 +91,7 @@ def test_a_killed_drive_is_made_again_and_ends_the_same(made: Path, tmp_path: Pa
     generate(out, SMALL, workers=1, drives=[("day", 1)])
     job = {"out": str(out), "settings": to_dict(SMALL), "condition": "night", "path": 1}
     command = [sys.executable, "-m", "evplace.city.worker", json.dumps(job)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=_environment()) as process:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment()) as process:
         assert process.stdout is not None
         process.stdout.readline()
         time.sleep(0.1)

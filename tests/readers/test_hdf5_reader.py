@@ -73,6 +73,13 @@ def test_nsavp(tmp_path: Path) -> None:
     assert np.array_equal(back.p, SOME.p)
 
 
+def test_the_unit_in_the_attribute_units(tmp_path: Path) -> None:
+    path = written(tmp_path / "u.h5", **rows(SOME.t_us * 1000, "events"))
+    with h5py.File(path, "a") as file:
+        file["events/t"].attrs["units"] = "nanoseconds"
+    assert np.array_equal(read(path).t_us, SOME.t_us)
+
+
 def test_prophesee(tmp_path: Path) -> None:
     table = np.zeros(len(SOME), [("x", "<u2"), ("y", "<u2"), ("p", "<i2"), ("t", "<i8")])
     table["x"], table["y"], table["p"], table["t"] = SOME.x, SOME.y, SOME.p, SOME.t_us

@@ -14,7 +14,7 @@ from made import some_events
 
 from evplace.errors import RecordingError
 from evplace.events import Events
-from evplace.readers import open_recording
+from evplace.readers import is_recording, open_recording
 
 SOME = some_events(30_000, 1_000_000)
 
@@ -114,3 +114,11 @@ def test_an_archive_that_unpacks_to_a_thousand_times_its_size_stays_small_in_mem
 def test_an_array_that_claims_more_than_it_holds_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="claims more"):
         open_recording(written(tmp_path / "short.npz", 1 << 40, 1, 10))
+
+
+def test_what_is_a_recording(tmp_path: Path) -> None:
+    (tmp_path / "README.md").write_text("my drives\n")
+    (tmp_path / "empty.npz").write_bytes(b"")
+    np.savez(tmp_path / "day.npz", t=SOME.t_us, x=SOME.x, y=SOME.y, p=SOME.p)
+    found = {file.name: is_recording(file) for file in [tmp_path, tmp_path / "none", *tmp_path.iterdir()]}
+    assert [name for name, is_one in found.items() if is_one] == ["day.npz"]

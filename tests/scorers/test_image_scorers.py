@@ -1,4 +1,4 @@
-"""sad and ncc against plain twins."""
+"""sad, ncc, cosine and seqslam against plain twins."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from evplace.errors import SettingsError
+from evplace.scorers import seqslam
+from evplace.scorers.cosine import CosineScorer
 from evplace.scorers.ncc import NccScorer, Settings, _reduction
 from evplace.scorers.sad import SadScorer
+from evplace.seqslam_images import prepare
 
 Images = NDArray[np.uint8]
 
@@ -56,3 +59,23 @@ def test_the_reduction_keeps_means() -> None:
 def test_settings_that_cannot_be_are_refused() -> None:
     with pytest.raises(SettingsError):
         Settings(sigma=-1)
+
+
+@pytest.mark.parametrize("shape", [(9, 16), (9, 16, 3)])
+def test_cosine_is_the_angle_between_pixels(shape: tuple[int, ...]) -> None:
+    references, queries = images(6, shape), images(4, shape, seed=1)
+    a, b = (block.reshape(len(block), -1).astype(float) for block in (queries, references))
+    wanted = a @ b.T / np.outer(np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1))
+    np.testing.assert_allclose(CosineScorer(references).rows(queries), wanted, atol=1e-5)
+    assert (CosineScorer(references).rows(np.zeros((1, *shape), np.uint8)) == 0).all()
+
+
+@pytest.mark.parametrize("patch", [0, 4])
+def test_seqslam_compares_prepared_images(patch: int) -> None:
+    references, queries = images(5, (30, 40, 3)), images(3, (30, 40, 3), seed=1)
+    settings = seqslam.Settings(width=16, height=8, patch=patch)
+    made = [[prepare(i, (16, 8), patch=patch or None).astype(int) for i in b] for b in (queries, references)]
+    wanted = [[-np.abs(q - r).mean() for r in made[1]] for q in made[0]]
+    np.testing.assert_allclose(seqslam.SeqSLAMScorer(references, settings).rows(queries), wanted, rtol=1e-5)
+    with pytest.raises(SettingsError, match="patch of 0"):
+        seqslam.Settings(patch=1)

@@ -10,7 +10,8 @@ from evplace.errors import InputError, MissingExtraError
 from evplace.events import Events
 from evplace.simulators import frames as films
 from evplace.simulators.esim import simulate
-from evplace.simulators.frames import open_film
+from evplace.simulators.frames import is_video, open_film
+from evplace.simulators.recording import SimulatedRecording
 
 
 def picture(k: int) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
@@ -66,6 +67,28 @@ def test_a_video_has_its_own_times(tmp_path: Path) -> None:
     assert film.size == (64, 48)
     assert [t for t, _ in frames] == [20_000 * k for k in range(6)]
     assert np.abs(frames[3][1].astype(int) - picture(3)).mean() < 12
+
+
+def test_images_as_they_are(tmp_path: Path) -> None:
+    film = open_film(write_video(tmp_path / "film.mp4", 4))
+    images = list(film.images())
+    assert film.timed
+    assert [t for t, _ in images] == [20_000 * k for k in range(4)]
+    assert images[0][1].shape == (48, 64, 3)
+    folder = open_film(write_images(tmp_path / "film", 3), fps=0.5)
+    assert not folder.timed
+    assert [(t, image.shape) for t, image in folder.images()][1] == (2_000_000, (48, 64))
+    assert is_video(tmp_path / "film.mp4")
+    assert not is_video(tmp_path / "film")
+
+
+def test_a_film_reads_like_a_recording(tmp_path: Path) -> None:
+    recording = SimulatedRecording(open_film(write_images(tmp_path / "film", 4)))
+    assert recording.size == (64, 48)
+    assert recording.path == tmp_path / "film"
+    first, again = (Events.concatenate(list(recording.packets())) for _ in range(2))
+    assert len(first) > 50
+    assert np.array_equal(first.t_us, again.t_us)
 
 
 def test_events_come_from_a_film(tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ from evplace.city.jit import compiled
 
 GREY = 0.24
 """Mean of the linear picture that the exposure aims at."""
-GAINS = (0.25, 4.0)
-"""Least and most gain; at night the most is not enough, so the picture stays dark and noisy."""
+LEAST_GAIN, MOST_GAIN = 0.25, 4.0
+"""At night the most is not enough, so the picture stays dark and noisy."""
 ADAPTS_S = 0.6
 """Time constant of the exposure."""
 SHOT, READ = 0.0006, 0.0025
@@ -26,14 +26,15 @@ _TABLE = np.array([round(255.0 * (k / STEPS) ** (1.0 / GAMMA)) for k in range(ST
 class ColourCamera:
     """Turns linear frames, given in the order of time, into 8-bit pictures."""
 
-    def __init__(self, seed: list[int]) -> None:
+    def __init__(self, seed: list[int], most_gain: float = MOST_GAIN) -> None:
+        self._most_gain = most_gain
         self._rng = np.random.default_rng(seed)
         self._gain = 0.0
         self._last_us = 0
 
     def expose(self, radiance: NDArray[np.float32], t_us: int) -> None:
         """Adapt the gain to a frame at a time; call once for each frame, before the pictures of it."""
-        wanted = min(max(GREY / max(float(_mean(radiance)), 1e-6), GAINS[0]), GAINS[1])
+        wanted = min(max(GREY / max(float(_mean(radiance)), 1e-6), LEAST_GAIN), self._most_gain)
         seconds = (t_us - self._last_us) * 1e-6
         share = 1.0 - math.exp(-seconds / ADAPTS_S) if self._gain else 1.0
         self._gain = wanted if not self._gain else self._gain * (wanted / self._gain) ** share

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Lock
 from typing import NamedTuple
 
-import evplace
-from evplace import errors
 from evplace.city.plan import VERSION, CitySettings, drive_name
 from evplace.city.recording import record_drive
 from evplace.city.town import build_town
 from evplace.city.warming import warm
-from evplace.errors import EvplaceError, OutputError
+from evplace.errors import OutputError
 from evplace.settings import to_dict
 from evplace.storage import read_json, write_json
+from evplace.workers import run_all
 
 SETTINGS_FILE = "city.json"
 
@@ -123,61 +118,9 @@ class _Meter:
 def _in_processes(
     folder: Path, settings: CitySettings, todo: list[tuple[str, int]], count: int, meter: _Meter
 ) -> None:
-    """Run `python -m evplace.city.worker` for each drive, `count` at a time.
-
-    Not multiprocessing: that would run the caller's own script again in each process. The loops are
-    compiled here first, so that it is done once, not `count` times.
-    """
-    running: list[subprocess.Popen[str]] = []
-
-    def make(pair: tuple[str, int]) -> None:
-        _work(folder, settings, pair, running, meter.of(drive_name(*pair)))
-
+    """Each drive in a process of its own; the loops are compiled here first, once and not `count` times."""
     warm(settings)
-    try:
-        with ThreadPoolExecutor(count) as pool:
-            for _ in pool.map(make, todo):
-                pass
-    finally:
-        for process in running:
-            process.kill()
-
-
-def _work(
-    folder: Path,
-    settings: CitySettings,
-    pair: tuple[str, int],
-    running: list[subprocess.Popen[str]],
-    tell: Callable[[float], None],
-) -> None:
-    """One drive in a process of its own; its lines are shares, or an error."""
-    job = json.dumps(
-        {"out": str(folder), "settings": to_dict(settings), "condition": pair[0], "path": pair[1]}
-    )
-    command = [sys.executable, "-m", "evplace.city.worker", job]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=_environment()) as process:
-        running.append(process)
-        for line in _lines(process):
-            if line.startswith("error "):
-                raise _error(line.removeprefix("error "))
-            tell(float(line))
-    if process.returncode != 0:
-        raise OutputError(f"the drive {drive_name(*pair)} was stopped (exit {process.returncode}): run again")
-
-
-def _lines(process: subprocess.Popen[str]) -> Iterator[str]:
-    assert process.stdout is not None
-    return (line.strip() for line in process.stdout)
-
-
-def _environment() -> dict[str, str]:
-    """The worker imports the same evplace as its caller."""
-    source = str(Path(evplace.__file__).parents[1])
-    before = os.environ.get("PYTHONPATH")
-    return {**os.environ, "PYTHONPATH": source + (os.pathsep + before if before else "")}
-
-
-def _error(line: str) -> EvplaceError:
-    told = json.loads(line)
-    kind = getattr(errors, told["kind"], OutputError)
-    return kind(told["text"]) if issubclass(kind, EvplaceError) else OutputError(told["text"])
+    plain = to_dict(settings)
+    jobs = [{"out": str(folder), "settings": plain, "condition": name, "path": path} for name, path in todo]
+    tellers = [meter.of(drive_name(*pair)) for pair in todo]
+    run_all("evplace.city.worker", jobs, count, lambda index, line: tellers[index](float(line)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from evplace.city.camera import LEAST_GAIN, MOST_GAIN
 from evplace.city.conditions import CONDITIONS, condition
 from evplace.errors import SettingsError
 from evplace.settings import to_dict
@@ -35,6 +36,9 @@ class CitySettings:
     """Images kept a second, of events and of colour at the same times."""
     dt: str = "1/30"
     """Seconds of events in an image, as a fraction (paper: 1/30)."""
+    most_gain: float = MOST_GAIN
+    """Largest gain of the colour camera. At 4, a fixed camera's, nights are dark; 64 exposes them fully, with
+    the noise that such a gain brings."""
     route_length_m: float = 0.0
     """Where routes are cut off, metres; 0 drives them to the end (about 2 km)."""
     seed: int = 0
@@ -53,6 +57,8 @@ class CitySettings:
                 raise SettingsError(
                     f"the setting '{name}' cannot be {getattr(self, name)}: it must be above 0"
                 )
+        if self.most_gain < LEAST_GAIN:
+            raise SettingsError(f"'most_gain' cannot be {self.most_gain}: it takes {LEAST_GAIN} or more")
         if not self.conditions or not self.paths or min(self.paths) < 1:
             raise SettingsError("give at least one condition and one path; paths are numbered from 1")
         if self.fps % self.image_hz:

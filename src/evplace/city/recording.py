@@ -66,7 +66,7 @@ def _drive(
     tick: Tick,
 ) -> list[GeoPose]:
     """Render every frame, feed every sensor, keep an image now and then; returns the images' poses."""
-    camera = ColourCamera([settings.seed, number])
+    camera = ColourCamera([settings.seed, number], settings.most_gain)
     every = settings.fps // settings.image_hz
     times, poses = film.times(settings.fps), []
     for k, t_us in enumerate(times):

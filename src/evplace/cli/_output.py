@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -49,6 +50,16 @@ def note_guesses(notes: object) -> None:
     """What was guessed of a recording, a remark each; `notes` are its own or those that a traverse kept."""
     for guess in notes if isinstance(notes, list) else []:
         note(str(guess))
+
+
+@contextlib.contextmanager
+def remarks() -> Iterator[None]:
+    """Warnings within the block as remarks, once it ends well."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for remark in caught:
+        note(str(remark.message))
 
 
 @contextlib.contextmanager

@@ -16,21 +16,32 @@ from evplace.errors import SettingsError
 
 
 def parse(module: ModuleType, name: str, arguments: list[str]) -> Any:
-    """The Args of a command; prints its help and exits with `--help`, SettingsError for a wrong flag."""
+    """The Args of a command; where these have a field `given`, it holds the names of the flags.
+
+    Prints the help and exits with `--help`; SettingsError for a wrong flag.
+    """
     said = io.StringIO()
+    flags = _from_file(module.Args, arguments) + arguments
     try:
         with contextlib.redirect_stderr(said):
-            return tyro.cli(
+            args = tyro.cli(
                 module.Args,
                 prog=f"evplace {name}",
                 description=module.__doc__,
-                args=_from_file(module.Args, arguments) + arguments,
+                args=flags,
                 config=(tyro.conf.FlagCreatePairsOff,),
             )
     except SystemExit as stop:
         if not stop.code:
             raise
         raise SettingsError(f"{_plain(said.getvalue())}; see evplace {name} --help") from None
+    return dataclasses.replace(args, given=_names(flags)) if hasattr(args, "given") else args
+
+
+def _names(flags: list[str]) -> tuple[str, ...]:
+    """The fields that the flags set."""
+    said = (flag[2:].partition("=")[0].replace("-", "_") for flag in flags if flag.startswith("--"))
+    return tuple(name.removeprefix("no_") for name in said)
 
 
 def _plain(message: str) -> str:
@@ -50,7 +61,7 @@ def _from_file(kind: type[Any], arguments: list[str]) -> list[str]:
 
 def _flags(kind: type[Any], values: dict[str, Any], where: str) -> list[str]:
     hints = get_type_hints(kind)
-    known = sorted(field.name for field in dataclasses.fields(kind))
+    known = sorted(field.name for field in dataclasses.fields(kind) if field.name != "given")
     flags: list[str] = []
     for key, value in values.items():
         if key not in known:

@@ -1,9 +1,11 @@
-"""Write an event recording in another format, chosen by the new file's suffix.
+"""Write a recording in another format, chosen by the new file's suffix; or a traverse as a folder of images.
 
 Examples:
   evplace convert night.bag night.npz
   evplace convert night.raw night.aedat4 --size 640 480
   evplace convert night.aedat4 night.h5            in the layout of DSEC
+  evplace convert day campus/database              day is a traverse folder: @east@north@...@.jpg, as benches
+  evplace convert night campus/queries             of frame-based place recognition read them
 """
 
 from __future__ import annotations
@@ -15,8 +17,10 @@ from typing import Literal
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
+from evplace.datasets.utm_folders import write_images
 from evplace.errors import DamagedRecordingError
 from evplace.readers import open_recording
+from evplace.traverse import Traverse
 from evplace.writers import write_recording
 
 
@@ -25,9 +29,9 @@ class Args:
     """Flags of `evplace convert`."""
 
     source: tyro.conf.Positional[Path]
-    """An event recording of any known format."""
+    """An event recording of any known format, or a traverse folder."""
     target: tyro.conf.Positional[Path]
-    """The file to write: .npz, .h5, .aedat4 or .raw (EVT3)."""
+    """The file to write: .npz, .h5, .aedat4 or .raw (EVT3); of a traverse, the folder of images."""
     size: tuple[int, int] | None = None
     """Width and height of the sensor in pixels, where the file does not say."""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
@@ -40,6 +44,8 @@ class Args:
 
 def run(args: Args) -> int:
     """Read, check and write."""
+    if (args.source / "traverse.json").exists():
+        return _write_images(args)
     recording = open_recording(args.source, args.size, time_unit=args.time_unit)
     fault = None
     try:
@@ -56,3 +62,11 @@ def run(args: Args) -> int:
     if fault is not None:
         note(f"{fault}; the events before it were written")
     return USED_GOOD_PART if fault is not None else 0
+
+
+def _write_images(args: Args) -> int:
+    traverse = Traverse.load(args.source)
+    written = write_images(traverse, args.target, args.overwrite)
+    facts = {"images": written, "without_position": len(traverse) - written}
+    print_json(facts) if args.json else print_facts(str(args.target), facts)
+    return 0

@@ -94,12 +94,13 @@ def run(args: Args) -> int:
 
 
 def _opened(args: Args, where: Localizer) -> Traverse:
-    """The query, its images made as the map's were."""
+    """The query, its images made as the map's were: of events, or the camera's own."""
     windows = settings.make(WindowSettings, where.map.settings.get("windows") or {})
     images = settings.make(ImageSettings, where.map.settings.get("images") or {})
     return open_traverse(
-        args.drive, args.track, windows, images, args.size, args.time_unit, where.cleaning, mask=where.mask
-    )
+        args.drive, args.track, windows, images, args.size, args.time_unit, where.cleaning,
+        mask=where.mask, kind=where.map.settings.get("input"),
+    )  # fmt: skip
 
 
 def _truth(args: Args, place_map: PlaceMap, query: Traverse) -> Truth | None:

@@ -1,4 +1,4 @@
-"""Turn a recording, or a folder of images, into a traverse folder of event images.
+"""Turn a recording, a video, a folder of images or a drive of a data set into a traverse folder.
 
 Examples:
   evplace images night.aedat4 -o night
@@ -8,26 +8,29 @@ Examples:
   evplace images night.aedat4 -o night --mask night_hot_pixels.txt
   evplace images day.aedat4 -o day --track day.nmea --every-m 2      an image every two metres
   evplace images frames/ -o day --crop-bottom 0 --width 80 --height 80
+  evplace images film.mp4 -o day                     events are simulated; --kind frames keeps the colours
+  evplace images brisbane/ --drive sunset1 -o sunset1         with its GPS; see evplace list datasets
 """
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 import tyro
 
-from evplace.capture import check_uncleaned, record, record_frames
+from evplace.capture import open_source, record
 from evplace.cleaning import CleaningSettings
-from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
-from evplace.frames import is_frames, open_frames
+from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
 from evplace.images import ImageSettings
 from evplace.sheets import contact_sheet
 from evplace.spacing import SpacingSettings
-from evplace.tracks import open_track
 from evplace.traverse import Traverse, TraverseWriter, new_traverse
 from evplace.windows import WindowSettings
+
+S = TypeVar("S", WindowSettings, ImageSettings)
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class Args:
     """Flags of `evplace images`."""
 
     source: tyro.conf.Positional[Path]
-    """An event recording, or a folder of images."""
+    """An event recording, a video, a folder of images, or a data set's folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The traverse folder to write."""
     track: Path | None = None
@@ -44,6 +47,13 @@ class Args:
     """Width and height of the sensor in pixels, where the file does not say."""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
     """Unit of the times, where the file does not say."""
+    drive: str | None = None
+    """For a data set: which drive."""
+    dataset: str | None = None
+    """For a data set that is not recognised by its layout: its name."""
+    kind: Literal["events", "frames"] | None = None
+    """events: simulate them where there are only images (as is done for videos and data sets of films);
+    frames: keep the camera's images, in colour where they have colours."""
     list: Path | None = None
     """For a folder of images: a .csv or .txt whose first column names the images to take, in order."""
     fps: float = 30.0
@@ -62,6 +72,7 @@ class Args:
     """Replace what exists."""
     json: bool = False
     """Print one JSON object."""
+    given: Annotated[tuple[str, ...], tyro.conf.Suppress] = ()
 
 
 def run(args: Args) -> int:
@@ -95,13 +106,16 @@ def run(args: Args) -> int:
 
 def _record(args: Args, writer: TraverseWriter) -> str | None:
     """Write the images; returns what broke off, if anything."""
-    if not is_frames(args.source):
+    drive = open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, args.fps)
+    windows, images = _over(drive.windows, args.windows, args), _over(drive.images, args.images, args)
+    with remarks():
         return record(
-            args.source, writer, args.track, args.windows, args.images, args.size, args.time_unit,
-            args.cleaning, args.spacing, args.mask,
-        )  # fmt: skip
-    check_uncleaned(args.source, args.cleaning, args.mask)
-    track = open_track(args.track) if args.track is not None else None
-    frames = open_frames(args.source, args.list, args.fps)
-    record_frames(frames, args.source, writer, args.images, track, args.spacing)
-    return None
+            drive, writer, args.track, windows, images, args.cleaning, args.spacing, args.mask, args.kind
+        )
+
+
+def _over(own: S, said: S, args: Args) -> S:
+    """The drive's own settings, with those on top that the user named."""
+    names = {field.name for field in dataclasses.fields(own)} & set(args.given)
+    values: dict[str, Any] = {name: getattr(said, name) for name in names}
+    return dataclasses.replace(own, **values)

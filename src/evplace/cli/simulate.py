@@ -11,7 +11,6 @@ they do not.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -19,7 +18,7 @@ from typing import Annotated, Literal
 import tyro
 
 from evplace import settings as settings_room
-from evplace.cli._output import note, print_facts, print_json
+from evplace.cli._output import print_facts, print_json, remarks
 from evplace.simulators.esim import PRESETS, SensorSettings, simulate
 from evplace.simulators.frames import open_film
 from evplace.writers import write_recording
@@ -52,12 +51,9 @@ def run(args: Args) -> int:
     values = settings_room.from_pairs(args.set)
     sensor = settings_room.make(SensorSettings, values, PRESETS[args.preset])
     film = open_film(args.film, args.fps)
-    with warnings.catch_warnings(record=True) as remarks:
-        warnings.simplefilter("always")
+    with remarks():
         packets = simulate(film, film.size, sensor, args.seed)
         events = write_recording(args.out, packets, film.size, overwrite=args.overwrite)
-    for remark in remarks:
-        note(str(remark.message))
     facts = {
         "events": events,
         "width": film.size[0],

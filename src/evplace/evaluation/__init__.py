@@ -45,6 +45,7 @@ __all__ = [
     "hits_at",
     "measure",
     "precision_recall",
+    "versions",
 ]
 
 
@@ -77,7 +78,7 @@ def measure(
     )
     times = np.full(len(judged), -1) if t_us is None else np.asarray(t_us, np.int64)
     resolved = dict(settings or {}) | {"truth": truth.rule}
-    return Result(figures, resolved, _versions(), answers, times, judged, seen, right, curve, scores)
+    return Result(figures, resolved, versions(), answers, times, judged, seen, right, curve, scores)
 
 
 def compare(results: Iterable[Result | str | Path]) -> list[dict[str, Any]]:
@@ -132,8 +133,8 @@ def _compare_with_truth(
     return right, seen, shares, hits if scores is not None else None
 
 
-def _versions() -> dict[str, str]:
-    """Of this package, python, and those packages at work here that can change a figure."""
+def versions() -> dict[str, str]:
+    """Versions of this package, python, and those packages at work here that can change a figure."""
     loaded = [name for name in ("numpy", "numba", "onnxruntime", "torch") if name in sys.modules]
     ours = {"evplace": __version__, "python": platform.python_version()}
     return ours | {name: metadata.version(name) for name in loaded}

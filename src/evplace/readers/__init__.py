@@ -27,7 +27,7 @@ from evplace.readers._source import Block, Hints, Source
 if TYPE_CHECKING:
     from evplace.readers._recording import Recording
 
-__all__ = ["Block", "Hints", "Recording", "Source", "open_recording"]
+__all__ = ["Block", "Hints", "Recording", "Source", "is_recording", "open_recording"]
 
 HEAD = 1 << 16
 """Bytes from which the format is told."""
@@ -67,6 +67,15 @@ def __getattr__(name: str) -> Any:
     from evplace.readers._recording import Recording
 
     return Recording
+
+
+def is_recording(path: Path) -> bool:
+    """Whether the content of the file or folder `path` is of a known recording format."""
+    try:
+        _found(path, _head(path))
+    except RecordingError:
+        return False
+    return True
 
 
 def _head(path: Path) -> bytes:

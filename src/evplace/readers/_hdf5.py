@@ -4,8 +4,9 @@
 |---|---|---|
 | DSEC | events/{t,x,y,p}, t_offset, ms_to_idx | us, plus t_offset |
 | M3ED | prophesee/left/{t,x,y,p}, ms_map_idx, calib/resolution | us |
-| NSAVP | events/{timestamps,x_coordinates,y_coordinates,polarities} | ns |
+| NSAVP | events/{timestamps,x_coordinates,y_coordinates,polarities}; attributes width, height, units | ns |
 | Prophesee | CD/events, one table of x, y, p, t | us |
+| DDD20 | dvs/data, packets of bytes (see `_hdf5_packets`) | us |
 
 Any other group or table with the four fields is read as well; its unit of time is guessed, or must be given.
 """
@@ -26,12 +27,14 @@ from numpy.typing import NDArray
 
 from evplace.errors import DamagedRecordingError, MissingExtraError, RecordingError
 from evplace.events import Size
-from evplace.readers import _columns
+from evplace.readers import _columns, _hdf5_packets
 from evplace.readers._source import Block, Hints, Source
 
 EVENTS = 1 << 19
 """Events read at a time."""
 KNOWN_UNITS = ("s", "ms", "us", "ns")
+LONG_UNITS = {"seconds": "s", "milliseconds": "ms", "microseconds": "us", "nanoseconds": "ns"}
+"""As NSAVP writes them, in the attribute `units`."""
 
 
 class _Layout(NamedTuple):
@@ -47,6 +50,8 @@ def open_here(path: Path, hints: Hints) -> Source:
     try:
         _load_filters()
         with h5py.File(path, "r") as file:
+            if _hdf5_packets.is_packets(file):
+                return Source(_hdf5_packets.SIZE, partial(_hdf5_packets.blocks, path))
             layouts = _layouts(file)
             if not layouts:
                 keys = ", ".join(list(file)[:10])
@@ -113,9 +118,11 @@ def _unit(file: h5py.File, layout: _Layout, hints: Hints) -> tuple[str, list[str
     if hints.time_unit is not None:
         return hints.time_unit, []
     group = file[layout.place]
-    stated = None if layout.table else group[layout.fields["t"]].attrs.get("unit")
-    if isinstance(stated, str) and stated in KNOWN_UNITS:
-        return stated, []
+    about = {} if layout.table else group[layout.fields["t"]].attrs
+    for stated in (about.get("unit"), about.get("units")):
+        unit = LONG_UNITS.get(stated, stated) if isinstance(stated, str) else None
+        if unit in KNOWN_UNITS:
+            return str(unit), []
     if layout.place == "CD/events" or {"ms_to_idx", "ms_map_idx"} & _keys_around(file, layout):
         return "us", []
     if layout.fields["x"] == "x_coordinates":

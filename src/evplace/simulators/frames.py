@@ -12,50 +12,80 @@ from numpy.typing import NDArray
 
 from evplace.errors import InputError, MissingExtraError
 from evplace.events import Size
-from evplace.frames import is_frames, open_frames
+from evplace.frames import Frames, is_frames, open_frames
 
 Grey = NDArray[np.uint8]
+
+VIDEOS = (".mp4", ".m4v", ".mov", ".mkv", ".avi", ".webm", ".mpg", ".mpeg")
+"""Suffixes of the usual containers; others are given to `evplace simulate`, which takes any that av reads."""
 
 
 @dataclass(frozen=True)
 class Film:
-    """Grey frames with times."""
+    """Camera images with their times."""
 
     path: Path
+    """The video, or the folder of the images."""
     size: Size
-    """(width, height) of the first frame."""
-    fps: float
-    """Images a second of a folder without times; a video, or timestamps.txt, has its own."""
+    """(width, height) of the first image."""
+    frames: Frames | None
+    """The images on disk; None where `path` is a video."""
+
+    @property
+    def timed(self) -> bool:
+        """Whether the times are the camera's, not made up from a rate."""
+        return self.frames is None or self.frames.timed
+
+    def name(self, n: int) -> str:
+        """What image `n` is called in errors."""
+        return f"image {n} of {self.path}" if self.frames is None else str(self.frames.files[n])
 
     def __iter__(self) -> Iterator[tuple[int, Grey]]:
-        """Each frame: microseconds, uint8 (H, W). InputError where one cannot be decoded."""
-        return _folder(self.path, self.fps) if self.path.is_dir() else _video(self.path)
+        """Each image in grey: microseconds, uint8 (H, W). InputError where one cannot be decoded."""
+        if self.frames is None:
+            return _video(self.path, "gray")
+        return ((t_us, image if image.ndim == 2 else _grey(image)) for t_us, image in self.images())
+
+    def images(self) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+        """Each image as it is: microseconds, uint8 (H, W), or (H, W, 3) where it has colours."""
+        if self.frames is None:
+            return _video(self.path, "rgb24")
+        return zip(map(int, self.frames.t_us), self.frames, strict=True)
 
 
 def open_film(path: str | Path, fps: float = 30.0) -> Film:
     """A video file, or a folder of images with or without timestamps.txt (seconds).
 
-    Raises InputError where it cannot be decoded, its times do not increase or it holds fewer than two
-    frames; MissingExtraError where a video needs the package av.
+    `fps` is for a folder without times. Raises InputError where it cannot be decoded, its times do not
+    increase or it holds no image; MissingExtraError where a video needs the package av.
     """
     film = Path(path)
     if not film.exists():
         raise InputError(f"there is no video or folder of images {film}")
-    if film.is_dir() and not is_frames(film):
+    if not film.is_dir():
+        return _sized(Film(film, (0, 0), None))
+    if not is_frames(film):
         inner = film / "images"
         if not (inner.is_dir() and is_frames(inner)):
             raise InputError(f"{film} holds no images: give a video, or a folder of images")
         film = inner
-    opened = Film(film, (0, 0), fps)
-    for _, first in opened:
-        return Film(film, (first.shape[1], first.shape[0]), fps)
-    raise InputError(f"{film} holds no frames")
+    return film_of(film, open_frames(film, fps=fps))
 
 
-def _folder(folder: Path, fps: float) -> Iterator[tuple[int, Grey]]:
-    frames = open_frames(folder, fps=fps)
-    for t_us, image in zip(frames.t_us, frames, strict=True):
-        yield int(t_us), image if image.ndim == 2 else _grey(image)
+def film_of(path: Path, frames: Frames) -> Film:
+    """Images on disk as a film; `path` is where they come from."""
+    return _sized(Film(path, (0, 0), frames))
+
+
+def is_video(path: Path) -> bool:
+    """Whether the name of `path` is a video's."""
+    return path.suffix.lower() in VIDEOS and not path.is_dir()
+
+
+def _sized(film: Film) -> Film:
+    for _, first in film:
+        return Film(film.path, (first.shape[1], first.shape[0]), film.frames)
+    raise InputError(f"{film.path} holds no frames")
 
 
 def _grey(image: Grey) -> Grey:
@@ -63,26 +93,26 @@ def _grey(image: Grey) -> Grey:
     return np.asarray(image @ np.array([0.299, 0.587, 0.114]) + 0.5).astype(np.uint8)
 
 
-def _video(path: Path) -> Iterator[tuple[int, Grey]]:
-    """Frames as they are shown, with the times in the file, from 0; frames of one time give the first."""
+def _video(path: Path, pixels: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    """Frames as they are shown, in the format `pixels`, with the times in the file, from 0."""
     av = _av()
     try:
         with av.open(str(path)) as container:
             if not container.streams.video:
                 raise InputError(f"{path} holds no video")
-            yield from _decoded(path, container)
+            yield from _decoded(path, container, pixels)
     except (av.error.FFmpegError, OSError) as error:
         raise InputError(f"cannot decode the video {path}: {error}") from error
 
 
-def _decoded(path: Path, container: Any) -> Iterator[tuple[int, Grey]]:
+def _decoded(path: Path, container: Any, pixels: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:
     begin = None
     for frame in container.decode(video=0):
         if frame.time is None:
             raise InputError(f"{path}: a frame has no time: convert the video, or give a folder of images")
         t_us = round(frame.time * 1e6)
         begin = t_us if begin is None else begin
-        yield t_us - begin, frame.to_ndarray(format="gray")
+        yield t_us - begin, frame.to_ndarray(format=pixels)
 
 
 def _av() -> Any:

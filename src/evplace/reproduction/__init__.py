@@ -1,0 +1,157 @@
+"""The paper's comparison on the benchmark city and on real sets: from recipes to documents.
+
+One file a table or figure; its name is what users ask for. Each holds NEEDS (city or data), `cases(drives,
+choice)` (all that must be run), `collect(drives, runs, choice)` (the document, as plain values), and
+`tables(document)` (the same for people). What was run is kept by its settings in the output folder, so that a
+second call, another table or a killed call runs only what is missing.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from evplace import plugs
+from evplace.city import generate
+from evplace.errors import InputError, SettingsError
+from evplace.evaluation import versions
+from evplace.reproduction._cases import Case
+from evplace.reproduction._cities import Cities
+from evplace.reproduction._real_sets import RealSets
+from evplace.reproduction._recipes import inputs
+from evplace.reproduction._runs import Runs
+from evplace.storage import locked, new_file, write_json
+from evplace.workers import run_all
+
+Drives = Cities | RealSets
+Progress = Callable[[int, int, str], None]
+"""Called with (cases done, cases in all, what is being done)."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How much of a table is made."""
+
+    seeds: int = 3
+    """Trainings of each network, each from other first weights; 0 is the first seed."""
+    train: dict[str, Any] = field(default_factory=dict)
+    """Settings of all trainings over those of the recipes: for a quick look."""
+    inputs: tuple[str, ...] = ()
+    """Only these inputs; empty for all."""
+
+    def __post_init__(self) -> None:
+        if self.seeds < 1:
+            raise SettingsError(f"{self.seeds} seeds make no table: take at least 1")
+        for name in self.inputs:
+            if name not in inputs():
+                raise SettingsError(f"unknown input '{name}': known are {', '.join(inputs())}")
+
+
+class Table(NamedTuple):
+    """Something to print."""
+
+    title: str
+    columns: list[str]
+    rows: list[list[str]]
+
+
+def reproduce(
+    name: str,
+    out: str | Path,
+    city: str | Path | None = None,
+    data: str | Path | None = None,
+    choice: Choice | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Make a table or figure and write `out/NAME.json`; returns what it holds.
+
+    `city` is a folder of `evplace city`; without one, the benchmark is made in `out/city`. `data` is a folder
+    of real sets, which the table `real` is made of. `workers` processes are used (None: one a core); they do
+    not change the result. Raises SettingsError for an unknown name, InputError where a drive is lacking,
+    OutputError where another process writes `out`.
+    """
+    folder, chosen = Path(out), choice or Choice()
+    family = plugs.load("reproduction", name)
+    count = workers or os.cpu_count() or 1
+    began, cpu_before = time.monotonic(), _cpu_s()
+    with locked(folder / name):
+        drives = _real_sets(data) if family.NEEDS == "data" else _cities(folder, city, count)
+        runs = Runs(folder, drives.settings)
+        cases = family.cases(drives, chosen)
+        _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, count, progress)
+        document: dict[str, Any] = family.collect(drives, runs, chosen)
+        document |= {
+            "settings": {"drives": drives.settings, "seeds": chosen.seeds, "train": chosen.train},
+            "versions": versions(),
+            "took_s": round(time.monotonic() - began, 1),
+            "cpu_s": round(_cpu_s() - cpu_before, 1),
+        }
+        with new_file(folder / f"{name}.json", overwrite=True) as partial:
+            write_json(partial, document)
+    return document
+
+
+def _cities(folder: Path, city: str | Path | None, workers: int) -> Cities:
+    """The given city, or the benchmark, made where it is not there yet."""
+    if city is None:
+        generate(folder / "city", workers=workers)
+    return Cities(Path(city) if city is not None else folder / "city", folder)
+
+
+def _real_sets(data: str | Path | None) -> RealSets:
+    """The sets in a folder of data; InputError where none is there."""
+    if data is None:
+        raise InputError("real sets are not made but read: give the folder that holds them with --data")
+    found = RealSets(Path(data))
+    if not found.settings:
+        raise InputError(f"{data} holds none of the real sets that there are recipes for")
+    return found
+
+
+def _answer(
+    cases: list[Case], total: int, drives: Drives, runs: Runs, workers: int, progress: Progress | None
+) -> None:
+    """Run all `cases` in processes; those that share a map stand together."""
+    if not cases:
+        return
+    drives.prepare(cases, workers)
+    groups: dict[str, list[Case]] = {}
+    for case in cases:
+        groups.setdefault(case.map_key(runs.source), []).append(case)
+    # What is trained comes first: the longest work last would leave a core idle. Each process gets its share
+    # at once, for starting one takes seconds.
+    ordered = sorted(groups.values(), key=lambda group: group[0].train is None)
+    count = min(workers, len(ordered))
+    shares = [[sorted(group, key=_shared) for group in ordered[start::count]] for start in range(count)]
+    jobs = [
+        {
+            "kind": type(drives).__name__, "drives": drives.to_dict(), "out": str(runs.out),
+            "threads": max(1, (os.cpu_count() or 1) // count),
+            "groups": [[case.to_dict() for case in group] for group in share],
+        }
+        for share in shares
+    ]  # fmt: skip
+    finished = [total - len(cases)]
+
+    def said(_: int, line: str) -> None:
+        finished[0] += 1
+        if progress is not None:
+            progress(finished[0], total, line)
+
+    run_all("evplace.reproduction._worker", jobs, count, said)
+
+
+def _shared(case: Case) -> tuple[str, str, str]:
+    """Cases of one query and scorer stand together, so that rows are scored once."""
+    return case.query, case.scorer, str(case.scorer_settings)
+
+
+def _cpu_s() -> float:
+    """Processor seconds of this process and of its ended children so far."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system

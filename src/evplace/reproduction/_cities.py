@@ -1,0 +1,164 @@
+"""The drives of the benchmark city as each input sees them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from evplace.city import CitySettings, generate
+from evplace.city.generation import SETTINGS_FILE
+from evplace.errors import InputError
+from evplace.events import Events
+from evplace.images import Imager, ImageSettings
+from evplace.placemap import PlaceMap
+from evplace.places import PlaceGrid
+from evplace.readers import open_recording
+from evplace.reproduction._cases import Case
+from evplace.settings import make, to_dict
+from evplace.storage import new_folder, read_json
+from evplace.tones import toned
+from evplace.traverse import Traverse, TraverseWriter
+from evplace.trial import Rule, truth_of
+from evplace.truth import Truth
+from evplace.windows import WindowSettings
+
+RULES: tuple[Rule, ...] = ("places", "view")
+EXPOSED_GAIN = 64.0
+"""Largest gain of the camera that exposes itself: enough for the city's nights."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Cities:
+    """Where drives are: the benchmark's, and those that a comparison makes beside it."""
+
+    city: Path
+    """Drives of every sensor, as `evplace city` makes them."""
+    beside: Path
+    """Folder for the drives of the self-exposing camera, for kept events, and for images made from them."""
+
+    def to_dict(self) -> dict[str, str]:
+        """As plain values, for a process of its own."""
+        return {"city": str(self.city), "beside": str(self.beside)}
+
+    @classmethod
+    def from_dict(cls, values: dict[str, str]) -> Self:
+        """What `to_dict` gave."""
+        return cls(Path(values["city"]), Path(values["beside"]))
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """How the benchmark's drives were made; InputError where there are none."""
+        if not (self.city / SETTINGS_FILE).exists():
+            raise InputError(f"{self.city} holds no drives: make them with evplace city -o {self.city}")
+        return read_json(self.city / SETTINGS_FILE, "the settings of a city")
+
+    def opened(self, drive: str, case: Case) -> Traverse:
+        """A drive as a case sees it."""
+        folder = self._folder(drive, case)
+        if not folder.is_dir():
+            raise InputError(
+                f"{self.city} lacks {drive}/{case.part}: make it with evplace city -o {self.city}"
+            )
+        found = Traverse.load(folder)[:: case.every]
+        if case.tone == "plain":
+            return found
+        return dataclasses.replace(found, images=toned(np.asarray(found.images), case.tone))
+
+    def places(self, day: Traverse, case: Case) -> PlaceGrid:
+        """The grid of the map's drive."""
+        assert day.track is not None  # the city knows where it is
+        return PlaceGrid.from_track(day.track, origin=case.origin)
+
+    def truths(self, place_map: PlaceMap, query: Traverse, _: Case) -> dict[str, Truth]:
+        """Rule -> what is right: by places, the paper's, and by view."""
+        return {rule: truth_of(place_map, query, rule) for rule in RULES}
+
+    def prepare(self, cases: list[Case], workers: int) -> None:
+        """Make the drives that the benchmark does not have and some case needs."""
+        if any(case.exposure == "auto" for case in cases):
+            exposed = self._like(sensors=(), most_gain=EXPOSED_GAIN, keep_events=False)
+            # Colour images need no frames between them: the camera's gain follows within a second anyhow.
+            exposed = dataclasses.replace(exposed, fps=exposed.image_hz)
+            wanted = {
+                drive for case in cases if case.exposure == "auto" for drive in (case.database, case.query)
+            }
+            generate(self._exposed, exposed, workers, drives=sorted(map(_pair, wanted)))
+        again = [case for case in cases if case.windows is not None or case.images is not None]
+        if not again:
+            return
+        wanted = {drive for case in again for drive in (case.database, case.query)}
+        if not all(self._recording(drive, case.part).exists() for case in again for drive in wanted):
+            kept = self._like(sensors=tuple(sorted({case.part for case in again})), keep_events=True)
+            generate(self._kept, kept, workers, drives=sorted(map(_pair, wanted)))
+        for case in again:
+            for drive in (case.database, case.query):
+                self._remake(drive, case)
+
+    @property
+    def _exposed(self) -> Path:
+        return self.beside / "city-exposed"
+
+    @property
+    def _kept(self) -> Path:
+        return self.beside / "city-events"
+
+    def _like(self, **changed: Any) -> CitySettings:
+        """The settings of drives like the benchmark's."""
+        told = {key: value for key, value in self.settings.items() if key != "version"}
+        return make(CitySettings, {**told, **changed})
+
+    def _folder(self, drive: str, case: Case) -> Path:
+        if case.windows is not None or case.images is not None:
+            return self.beside / "remade" / f"{drive} {case.part} {_name(case)}"
+        return (self._exposed if case.exposure == "auto" else self.city) / drive / case.part
+
+    def _recording(self, drive: str, part: str) -> Path:
+        here = self.city / drive / f"{part}.aedat4"
+        return here if here.exists() else self._kept / drive / f"{part}.aedat4"
+
+    def _remake(self, drive: str, case: Case) -> None:
+        """The images of a drive made anew from its events, at the same times."""
+        folder = self._folder(drive, case)
+        if folder.exists():
+            return
+        windows = make(WindowSettings, case.windows or {})
+        images = make(ImageSettings, case.images or {})
+        given = Traverse.load(self.city / drive / case.part)
+        info = {**given.info, "windows": to_dict(windows), "images": to_dict(images)}
+        with new_folder(folder) as partial:
+            writer = TraverseWriter(partial, info)
+            recording = open_recording(self._recording(drive, case.part))
+            events = Events.concatenate(list(recording.packets()))
+            imager = Imager(recording.size, images)
+            for t_us, window in zip(given.t_us.tolist(), _windows(events, given, windows), strict=True):
+                imager.add(window)
+                writer.add(imager.image(t_us), t_us, len(window))
+            writer.track = given.track
+            writer.close()
+
+
+def _windows(events: Events, given: Traverse, windows: WindowSettings) -> Iterator[Events]:
+    """For each image, the events of the last dt before its time, or the last `count` of them."""
+    ends = np.searchsorted(events.t_us, given.t_us, "right")
+    if windows.count:
+        starts = np.maximum(ends - windows.count, 0)
+    else:
+        dt_us = round(windows.seconds * 1_000_000)
+        starts = np.searchsorted(events.t_us, given.t_us - dt_us, "right")
+    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
+        yield events[start:end]
+
+
+def _name(case: Case) -> str:
+    """The settings of images and windows as a folder's name."""
+    told = {**(case.windows or {}), **(case.images or {})}
+    return " ".join(f"{key}={value}".replace("/", "_") for key, value in sorted(told.items())) or "as it was"
+
+
+def _pair(drive: str) -> tuple[str, int]:
+    condition, _, path = drive.rpartition("-")
+    return condition, int(path)

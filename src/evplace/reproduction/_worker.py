@@ -1,0 +1,139 @@
+"""Many cases in a process of its own: `python -m evplace.reproduction._worker JOB`."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.errors import MissingExtraError
+from evplace.evaluation import Result, measure
+from evplace.localizer import Localizer
+from evplace.placemap import PlaceMap
+from evplace.reproduction import Drives
+from evplace.reproduction._cases import Case
+from evplace.reproduction._cities import Cities
+from evplace.reproduction._real_sets import RealSets
+from evplace.reproduction._runs import Runs
+from evplace.settings import make
+from evplace.sweeps import SWEPT, sweep
+from evplace.training import TrainSettings, train
+from evplace.traverse import Traverse
+from evplace.workers import serve
+
+KINDS: dict[str, type[Cities] | type[RealSets]] = {kind.__name__: kind for kind in (Cities, RealSets)}
+
+
+def work(job: dict[str, Any], say: Callable[[str], None]) -> None:
+    """Answer the cases of all groups of `job`, each of which shares a map; says what was done, one by one."""
+    _limit_threads(job["threads"])
+    drives = KINDS[job["kind"]].from_dict(job["drives"])
+    runs = Runs(Path(job["out"]), drives.settings)
+    for group in job["groups"]:
+        _answer_group([Case.from_dict(values) for values in group], drives, runs, say)
+
+
+def _answer_group(cases: list[Case], drives: Drives, runs: Runs, say: Callable[[str], None]) -> None:
+    """Learn the map of `cases`, and answer them one query and scorer after the other."""
+    day = drives.opened(cases[0].database, cases[0])
+    learned = _learned(cases[0], day, drives, runs)
+    for _, group in itertools.groupby(cases, lambda case: (case.query, case.scorer, case.scorer_settings)):
+        same = list(group)
+        settings = {**learned.settings, "scorer": same[0].scorer_settings}
+        place_map = dataclasses.replace(learned, scorer=same[0].scorer, settings=settings)
+        query = drives.opened(same[0].query, same[0])
+        rows: NDArray[np.float32] | None = None
+        for case in same:
+            rows = _answer(case, place_map, query, rows, drives, runs)
+            say(f"{case.query} {case.part} {case.scorer} {case.matcher}")
+
+
+def _limit_threads(threads: int) -> None:
+    """As many threads as there are cores for this process: more would only get in each other's way."""
+    try:
+        import torch
+    except ModuleNotFoundError as error:
+        raise MissingExtraError("torch", "train", "training the network") from error
+    torch.set_num_threads(threads)
+
+
+def _learned(case: Case, day: Traverse, drives: Drives, runs: Runs) -> PlaceMap:
+    """The map of a case: read where it is there, else learned, and kept where that took long."""
+    places = drives.places(day, case)
+    if case.train is None:
+        return train(day, places, case.scorer, scorer_settings=case.scorer_settings)
+    file = runs.map_file(case)
+    if not file.exists():
+        settings = make(TrainSettings, case.train)
+        began = time.process_time()
+        place_map = train(day, places, settings=settings, checkpoint=file.with_suffix(".checkpoint"))
+        place_map.settings["train_cpu_s"] = round(time.process_time() - began, 1)
+        place_map.save(file)
+    return PlaceMap.load(file)
+
+
+def _answer(
+    case: Case,
+    place_map: PlaceMap,
+    query: Traverse,
+    rows: NDArray[np.float32] | None,
+    drives: Drives,
+    runs: Runs,
+) -> NDArray[np.float32]:
+    """Answer one case and keep what came out; returns the score rows, for the next one."""
+    began = time.process_time()
+    where = Localizer(place_map, case.matcher, **case.matcher_settings)
+    path, rows = where.path(query, rows)
+    found: dict[str, Any] = {}
+    for rule, truth in drives.truths(place_map, query, case).items():
+        settings = {"case": case.to_dict(), "map": place_map.settings, "matcher": where.settings}
+        result = measure(path, truth, rows, place_map.items.position, query.t_us, settings)
+        found[rule] = {"figures": result.figures}
+        if case.swept:
+            found[rule]["curve"] = _curve(case, rows, query, result, truth.accepts).tolist()
+        if case.keep and not found.keys() - {rule}:
+            result.save(runs.result_folder(case), overwrite=True)
+    runs.keep(case, {"rules": found, "cpu_s": round(time.process_time() - began, 2)})
+    return rows
+
+
+def _curve(
+    case: Case,
+    rows: NDArray[np.float32],
+    query: Traverse,
+    result: Result,
+    accepts: Callable[[NDArray[np.int64]], NDArray[np.bool_]],
+) -> NDArray[np.float64]:
+    """(values, 3) the swept parameter's value, recall (of the seen) and precision, in the order of recall."""
+    filled = np.flatnonzero(query.counts != 0)
+    parameter = SWEPT[case.matcher]
+    others = {name: value for name, value in case.matcher_settings.items() if name != parameter}
+    values = _every_level(rows[filled]) if case.matcher == "local" else None
+    points = []
+    for value, path in sweep(
+        case.matcher, rows[filled], values, parameter, distances=case.scorer in ("sad", "seqslam"), **others
+    ):
+        item = np.full(len(query), -1, np.int64)
+        item[filled] = np.where(path.accepted, path.item, -1)
+        accepted, right = (item >= 0)[result.judged], accepts(item)[result.judged]
+        if accepted.any():
+            seen = max(int(result.seen[result.judged].sum()), 1)
+            points.append((value, right.sum() / seen, right.sum() / accepted.sum()))
+    curve = np.array(sorted(points, key=lambda point: (point[1], -point[2]))).reshape(-1, 3)
+    return np.asarray(np.nan_to_num(curve, posinf=1e30, neginf=-1e30), np.float64)
+
+
+def _every_level(rows: NDArray[np.float32]) -> list[float]:
+    """Every value of tau1 at which some answer can change."""
+    return [float(value) for value in np.unique(rows.max(axis=1))[::-1]] + [-1.0]
+
+
+if __name__ == "__main__":
+    sys.exit(serve(work))

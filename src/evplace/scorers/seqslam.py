@@ -1,0 +1,61 @@
+"""SeqSLAM's comparison: small grey images with normalised patches, by the sum of absolute differences.
+
+OpenSeqSLAM 2.0 has MATLAB's `localcontrast` where the older program, and this one, normalises patches.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.distances import sad
+from evplace.errors import SettingsError
+from evplace.placemap import PlaceMap
+from evplace.scorers import references_of
+from evplace.seqslam_images import prepare
+from evplace.settings import make
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How images are prepared, with OpenSeqSLAM's defaults."""
+
+    width: int = 64
+    """Columns after the reduction (OpenSeqSLAM: 64)."""
+    height: int = 32
+    """Rows after the reduction (OpenSeqSLAM: 32)."""
+    patch: int = 8
+    """Side of the patches whose contrast is normalised (OpenSeqSLAM 2013: 8); 0 leaves them as they are."""
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1 or self.patch < 0 or self.patch == 1:
+            raise SettingsError(
+                f"images of {self.width}x{self.height} in patches of {self.patch} are impossible: take a "
+                "width and height from 1, and a patch of 0 (none) or from 2"
+            )
+
+
+class SeqSLAMScorer:
+    """One score a reference image: the negated mean absolute difference, in grey levels."""
+
+    distances = True
+
+    def __init__(self, references: NDArray[np.uint8], settings: Settings) -> None:
+        """From reference images (items, h, w) or (items, h, w, 3)."""
+        self._settings = settings
+        self._references = self._prepared(references)
+
+    def rows(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """See Scorer."""
+        return -sad(self._prepared(images), self._references)
+
+    def _prepared(self, images: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        s = self._settings
+        return np.stack([prepare(image, (s.width, s.height), patch=s.patch or None) for image in images])
+
+
+def scorer(place_map: PlaceMap) -> SeqSLAMScorer:
+    """Over the reference images of a map, with the settings that it was made with."""
+    return SeqSLAMScorer(references_of(place_map), make(Settings, place_map.settings["scorer"]))

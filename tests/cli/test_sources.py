@@ -1,0 +1,161 @@
+"""`evplace images` on data sets, videos and films; `convert` to a folder of images; `list` of one family."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from conftest import make_drive, write_drive
+from evplace.cli import main
+from made_sets import SAN_FRANCISCO, picture, write_gta, write_lens, write_own, write_robotcar, write_utm
+
+Capture = pytest.CaptureFixture[str]
+DATE = "2014-12-09-13-21-02"
+
+
+def said(capsys: Capture, *arguments: object) -> Any:
+    """What a command prints with --json."""
+    capsys.readouterr()
+    assert main([*map(str, arguments), "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def fault(capsys: Capture, *arguments: object) -> str:
+    """The one line on standard error of a command that fails with code 2."""
+    capsys.readouterr()
+    assert main([*map(str, arguments)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1, lines
+    return lines[0]
+
+
+def write_video(path: Path, images: int = 12) -> Path:
+    av = pytest.importorskip("av", reason="needs the extra 'video'")
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=60)
+        stream.width, stream.height, stream.pix_fmt, stream.bit_rate = 64, 48, "yuv420p", 4_000_000
+        for n in range(images):
+            image = np.stack([picture(0.4 * n), picture(0), picture(0)], axis=-1)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        container.mux(stream.encode())
+    return path
+
+
+def info_of(traverse: Path) -> Any:
+    return json.loads((traverse / "traverse.json").read_text())["info"]
+
+
+def test_a_drive_of_a_data_set(tmp_path: Path, capsys: Capture) -> None:
+    write_robotcar(tmp_path / "oxford")
+    out = tmp_path / "t"
+    facts = said(capsys, "images", tmp_path / "oxford", "--drive", DATE, "-o", out)
+    assert facts["shape"] == [90, 160]
+    assert facts["with_position"] > 0
+    assert (info_of(out)["input"], info_of(out)["windows"]["dt"]) == ("events", "1/16")
+    again = ("images", tmp_path / "oxford", "--overwrite", "-o", out)
+    assert said(capsys, *again, "--kind", "frames", "--width", 40)["shape"] == [90, 40, 3]
+    said(capsys, *again, "--dt", "1/30")
+    assert info_of(out)["windows"]["dt"] == "1/30"
+
+
+def test_what_is_not_said_is_the_data_sets_own(tmp_path: Path, capsys: Capture) -> None:
+    write_lens(tmp_path)
+    out = ("images", tmp_path, "-o", tmp_path / "t", "--overwrite")
+    assert said(capsys, *out)["shape"] == [7, 7]
+    assert said(capsys, *out, "--width=14")["shape"] == [7, 14]
+    toml = tmp_path / "s.toml"
+    toml.write_text("[images]\nheight = 21\n")
+    assert said(capsys, *out, "--settings", toml)["shape"] == [21, 7]
+    toml.write_text('given = "width"\n')
+    assert "unknown setting 'given'" in fault(capsys, *out, "--settings", toml)
+
+
+def test_a_video_is_simulated_or_kept(tmp_path: Path, capsys: Capture) -> None:
+    video, out = write_video(tmp_path / "film.mp4"), tmp_path / "t"
+    assert said(capsys, "images", video, "-o", out)["shape"] == [90, 160]
+    assert info_of(out)["simulated"]["seed"] == 0
+    facts = said(capsys, "images", video, "-o", out, "--kind", "frames", "--overwrite")
+    assert (facts["images"], facts["shape"]) == (12, [90, 160, 3])
+    assert info_of(out)["timed"]
+
+
+def test_a_query_is_made_as_its_map_was(tmp_path: Path, capsys: Capture) -> None:
+    video = write_video(tmp_path / "film.mp4")
+    for kind in ("events", "frames"):
+        said(capsys, "images", video, "-o", tmp_path / kind, "--kind", kind)
+        made = ("-o", tmp_path / f"{kind}.evp", "--scorer", "sad", "--run-length", 2)
+        said(capsys, "train", tmp_path / kind, *made)
+        query = ("evaluate", tmp_path / f"{kind}.evp", video, "--matcher", "best")
+        assert said(capsys, *query, "-o", tmp_path / f"{kind}.result")["accuracy"] > 0.8
+
+
+def test_a_folder_of_images_is_kept_or_simulated(tmp_path: Path, capsys: Capture) -> None:
+    write_gta(tmp_path)
+    folder = tmp_path / "day" / "images"
+    (tmp_path / "day" / "6dpose_list.txt").unlink()
+    out = ("images", "-o", tmp_path / "t", "--fps", 60, "--overwrite")
+    assert said(capsys, *out, folder)["images"] == 6
+    assert said(capsys, *out, folder.parent)["images"] == 6
+    assert said(capsys, *out, folder, "--kind", "events")["shape"] == [90, 160]
+
+
+def test_fast_films_are_remarked_upon(tmp_path: Path, capsys: Capture) -> None:
+    (tmp_path / "film").mkdir()
+    for n in range(8):
+        Image.fromarray(picture(9 * n)).save(tmp_path / "film" / f"{n}.png")
+    assert main(["images", f"{tmp_path}/film", "-o", f"{tmp_path}/t", "--kind", "events"]) == 0
+    assert "pixel" in capsys.readouterr().err
+
+
+def test_a_traverse_becomes_a_folder_of_images(tmp_path: Path, capsys: Capture) -> None:
+    write_drive(tmp_path, "day", make_drive(windows=8))
+    day, images = tmp_path / "day", tmp_path / "campus" / "database"
+    said(capsys, "images", f"{day}.aedat4", "--track", f"{day}.csv", "-o", day)
+    assert said(capsys, "convert", day, images) == {"images": 8, "without_position": 0}
+    assert said(capsys, "images", images.parent, "-o", tmp_path / "back")["with_position"] == 8
+    assert np.allclose(
+        np.load(day / "track.npy")[:, 2:4], np.load(tmp_path / "back" / "track.npy")[:, 2:4], atol=0.01
+    )
+    assert "exists" in fault(capsys, "convert", day, images)
+
+
+def test_the_list_of_one_family(capsys: Capture) -> None:
+    parts = said(capsys, "list", "datasets")
+    assert list(parts) == ["datasets"]
+    assert "Needs DATE/stereo/centre/*.png" in parts["datasets"]["robotcar"]
+    assert set(parts) < set(said(capsys, "list"))
+    assert "colours" in fault(capsys, "list", "colours")
+
+
+def test_faults_of_folders(tmp_path: Path, capsys: Capture) -> None:
+    out = ("-o", tmp_path / "t")
+    images = ("images", tmp_path / "set")
+    assert "there is no folder" in fault(capsys, *images, "--drive", "day", *out)
+    (tmp_path / "set").mkdir()
+    assert "layout of no known data set" in fault(capsys, *images, "--drive", "day", *out)
+    assert "none of the datasets" in fault(capsys, *images, "--dataset", "kitty", *out)
+    write_gta(tmp_path / "set")
+    assert "holds no drive 'dya': it holds day" in fault(capsys, *images, "--drive", "dya", *out)
+    assert "leave these out" in fault(capsys, *images, "--drive", "day", "--size", 4, 4, *out)
+    write_own(tmp_path / "set", ("day",))
+    assert "may be gta or own: say which with --dataset" in fault(capsys, *images, *out)
+    assert "no camera images" in fault(
+        capsys, *images, "--dataset", "own", "--drive", "day", "--kind", "frames", *out
+    )
+    write_lens(tmp_path / "lens")
+    assert "are no film" in fault(capsys, "images", tmp_path / "lens", "--kind", "events", *out)
+    write_utm(tmp_path / "utm", "queries", [SAN_FRANCISCO, "@nan@1.0"])
+    assert "not a number" in fault(capsys, "images", tmp_path / "utm", *out)
+    assert not (tmp_path / "t").exists()
+
+
+def test_a_drive_of_another_time_does_not_overlap(tmp_path: Path, capsys: Capture) -> None:
+    write_own(tmp_path, ("day",))
+    log = tmp_path / "day.csv"
+    log.write_text(log.read_text().replace("\n17", "\n16"))
+    assert "do not overlap" in fault(capsys, "images", tmp_path, "-o", tmp_path / "t")
