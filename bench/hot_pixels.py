@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evplace.capture import record
+from evplace.capture import open_source, record
 from evplace.cleaning import CleaningSettings
 from evplace.events import Events, Size
 from evplace.localizer import Localizer
@@ -76,7 +76,7 @@ def images(recording: Path, drive: Path, folder: Path, mask_hot: bool) -> Traver
     """The event images of a recording, with the positions of the city's own traverse of it."""
     with new_traverse(folder, {}) as writer:
         cleaning = CleaningSettings(mask_hot=mask_hot)
-        record(recording, writer, Traverse.load(drive).track, cleaning=cleaning)
+        record(open_source(recording), writer, Traverse.load(drive).track, cleaning=cleaning)
     return Traverse.load(folder)[::EVERY]
 
 
