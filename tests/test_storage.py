@@ -124,3 +124,25 @@ def test_json_and_checksums(tmp_path: Path) -> None:
     assert read_json(tmp_path / "x.json", "it") == {"a": 1}
     (tmp_path / "abc").write_bytes(b"abc")
     assert sha256(tmp_path / "abc").startswith("ba7816bf")
+
+
+@pytest.mark.parametrize("shape", [(10**15,), (10**30,), (-5,), (9,)])
+def test_what_an_array_claims_is_held_against_its_file(shape: tuple[int, ...], tmp_path: Path) -> None:
+    with (tmp_path / "bomb.npy").open("wb") as file:
+        header = {"descr": "<i8", "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(file, header)
+        file.write(bytes(64))
+    for mapped in (False, True):
+        with pytest.raises(InputError, match="it is damaged"):
+            read_array(tmp_path / "bomb.npy", "it", memory_mapped=mapped)
+
+
+def test_an_archive_or_objects_under_the_name_of_an_array(tmp_path: Path) -> None:
+    with (tmp_path / "zip.npy").open("wb") as file:
+        np.savez(file, a=[1])
+    np.save(tmp_path / "objects.npy", np.array([{}]))
+    for name in ("zip.npy", "objects.npy"):
+        with pytest.raises(InputError, match="it is damaged"):
+            read_array(tmp_path / name, "it")
+    np.save(tmp_path / "empty.npy", np.zeros((0, 4)))
+    assert read_array(tmp_path / "empty.npy", "it").shape == (0, 4)

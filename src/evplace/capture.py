@@ -159,6 +159,7 @@ def record_events(
         "images": settings_room.to_dict(images),
         "cleaning": settings_room.to_dict(cleaning),
         "spacing": settings_room.to_dict(spacer.settings),
+        "notes": recording.notes,
         "dropped": recording.dropped,
         "cleaned": stream.cleaned,
         "left_out": spacer.left_out,

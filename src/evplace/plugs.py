@@ -5,6 +5,7 @@ Adding a part touches its own file and its test, nothing else: the folder itself
 
 from __future__ import annotations
 
+import functools
 import importlib
 import pkgutil
 from types import ModuleType
@@ -14,9 +15,15 @@ from evplace.errors import SettingsError
 
 def names(family: str) -> list[str]:
     """The parts of a family, for example `names("matchers")`: the public files of its folder, sorted."""
+    return list(_names(family))
+
+
+@functools.cache
+def _names(family: str) -> tuple[str, ...]:
+    """Looked up once: telling a recording's format asks for every reader, and a folder is slow to list."""
     package = importlib.import_module(f"evplace.{family}")
     found = (module.name for module in pkgutil.iter_modules(package.__path__))
-    return sorted(name for name in found if not name.startswith("_"))
+    return tuple(sorted(name for name in found if not name.startswith("_")))
 
 
 def load(family: str, name: str) -> ModuleType:

@@ -140,14 +140,18 @@ class GrowingArray:
         np.lib.format.write_array_header_1_0(self._file, header)
 
 
-def read_array(path: Path, what: str, memory_mapped: bool = False) -> NDArray[Any]:
-    """The array in a .npy file; InputError, naming `what` it should be, where there is none."""
+def read_array(path: str | Path, what: str, memory_mapped: bool = False) -> NDArray[Any]:
+    """The array in a .npy file; InputError, naming `what` it should be, where there is none.
+
+    It is mapped first, whatever is wanted: then what a damaged header claims is held against the file's
+    length, where reading would allocate it. Nothing is unpickled.
+    """
     try:
-        array: NDArray[Any] = np.load(path, mmap_mode="r" if memory_mapped else None, allow_pickle=False)
-        return array
+        array: NDArray[Any] = np.lib.format.open_memmap(path, mode="r")
+        return array if memory_mapped else np.array(array)
     except OSError as error:
         raise InputError(f"cannot read {what}: {path}: {error.strerror or error}") from error
-    except (ValueError, EOFError) as error:
+    except (ValueError, EOFError, OverflowError) as error:
         raise InputError(f"{what} is damaged: {path} is not a whole .npy array ({error})") from error
 
 

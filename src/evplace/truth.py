@@ -19,8 +19,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from evplace.errors import EvaluationError
+from evplace.errors import EvaluationError, InputError
 from evplace.places import Places
+from evplace.storage import read_array
 from evplace.tracks import Track
 
 Floats = NDArray[np.float64]
@@ -228,12 +229,9 @@ def by_matrix(
 
 def _loaded(path: str | Path) -> NDArray[Any]:
     try:
-        array: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
-    except OSError as error:
-        raise EvaluationError(f"cannot read the truth matrix {path}: {error.strerror or error}") from error
-    except (ValueError, EOFError) as error:
-        raise EvaluationError(f"{path} is no .npy file of numbers: {error}") from error
-    return array
+        return read_array(path, "the truth matrix", memory_mapped=True)
+    except InputError as error:
+        raise EvaluationError(str(error)) from error
 
 
 def _shape_fault(shape: tuple[int, ...], n_queries: int, n_items: int, rows: str) -> str:

@@ -287,3 +287,25 @@ def test_a_training_that_was_stopped_goes_on(folder: Path, how: signal.Signals) 
     stopped, whole = ((folder / name / "network.onnx").read_bytes() for name in ("stopped", "whole"))
     assert stopped == whole
     assert not (folder / ".stopped.checkpoint").exists()
+
+
+def test_guesses_are_told_and_unclear_ones_refused(folder: Path, street: Path, capsys: Capture) -> None:
+    """Neither the unit of time nor the sensor's size stands in the file."""
+    events = make_drive(windows=20, noise=0.1).events
+    np.savez(folder / "guess.npz", t=events.t_us, x=events.x, y=events.y, p=events.p)
+    learn = ("--track", folder / "day.csv", "-o", folder / "m", "--scorer", "sad", "--run-length", 2)
+    size = ("--size", 80, 60)
+    for command in (
+        ("images", folder / "guess.npz", "-o", folder / "g"),
+        ("train", folder / "guess.npz", *learn),
+        ("localize", street, folder / "guess.npz", "-o", folder / "a.csv", *size),
+        ("evaluate", street, folder / "guess.npz", "-o", folder / "r", "--track", folder / "day.csv", *size),
+    ):
+        capsys.readouterr()
+        assert main([*map(str, command)]) == 0
+        told = capsys.readouterr().err
+        assert "evplace: times in 't' are taken as us" in told
+        assert ("128x128 inferred from its events" in told) == (size[1] not in command)
+    np.savez(folder / "unclear.npz", t=events.t_us * 1000, x=events.x, y=events.y, p=events.p)
+    told = fault(capsys, "images", folder / "unclear.npz", "-o", folder / "u")
+    assert "give the time unit" in told

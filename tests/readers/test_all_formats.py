@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-import random
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import damage
 import numpy as np
 import pytest
 from made import MAKERS, SIZE, some_events
@@ -19,14 +19,15 @@ from evplace.errors import DamagedRecordingError, EvplaceError, RecordingError
 from evplace.events import Events
 from evplace.readers import open_recording
 
-CUTS = int(os.environ.get("EVPLACE_CUTS", "30"))
-FLIPS = int(os.environ.get("EVPLACE_FLIPS", "200"))
+CUTS = int(os.environ.get("EVPLACE_CUTS", "200"))
+FLIPS = int(os.environ.get("EVPLACE_FLIPS", "2000"))
 SEED = int(os.environ.get("EVPLACE_SEED", "0"))
 UNREADABLE_WHEN_CUT = ("npz", "hdf5", "parquet")
 """Formats that keep whole columns and an index, so that a cut takes something of every event."""
-SLOW = ("hdf5", "parquet")
-"""Formats that start a process for each reading: they get fewer cuts and flips."""
+ISOLATED = {"hdf5": "_hdf5", "parquet": "_parquet"}
+"""Formats that start a process for each reading -> what runs in it: here many readings share one."""
 formats = pytest.mark.parametrize("form", sorted(MAKERS))
+in_this_process = pytest.mark.parametrize("form", sorted(set(MAKERS) - set(ISOLATED)))
 
 
 def test_each_format_has_a_maker() -> None:
@@ -65,15 +66,12 @@ def test_events_come_back(form: str, tmp_path: Path) -> None:
     assert sum(len(packet) for packet in recording.packets()) == len(events), "a second reading starts anew"
 
 
-@formats
+@in_this_process
 def test_a_cut_anywhere_delivers_what_came_before(form: str, tmp_path: Path) -> None:
     path = MAKERS[form](tmp_path, some_events())
     whole, data = Events.concatenate(read_all(path)[0]), path.read_bytes()
-    rng, cut_file, most = random.Random(SEED), tmp_path / f"cut{path.suffix}", 0
-    for at in [
-        *(rng.randrange(len(data)) for _ in range(CUTS // 10 if form in SLOW else CUTS)),
-        len(data) * 9 // 10,
-    ]:
+    cut_file, most = tmp_path / f"cut{path.suffix}", 0
+    for at in [*damage.cuts(len(data), SEED, CUTS), len(data) * 9 // 10]:
         cut_file.write_bytes(data[:at])
         packets, error = read_all(cut_file)
         count = sum(map(len, packets))
@@ -85,25 +83,41 @@ def test_a_cut_anywhere_delivers_what_came_before(form: str, tmp_path: Path) -> 
     assert most > len(whole) // 2 or form in UNREADABLE_WHEN_CUT
 
 
-@formats
+@in_this_process
 def test_flipped_bytes_give_events_in_order_or_our_error(form: str, tmp_path: Path) -> None:
-    path = MAKERS[form](tmp_path, some_events())
-    data, rng = path.read_bytes(), random.Random(SEED + 1)
+    path = MAKERS[form](tmp_path, some_events(500))
+    data = path.read_bytes()
     flipped_file = tmp_path / f"flipped{path.suffix}"
-    for number in range(FLIPS // 20 if form in SLOW else FLIPS):
-        # Half of them where the structure is, at the start.
-        at = rng.randrange(len(data) if number % 2 else min(len(data), 2000))
-        flipped_file.write_bytes(data[:at] + bytes([data[at] ^ 1 << rng.randrange(8)]) + data[at + 1 :])
+    for number in range(FLIPS):
+        flipped_file.write_bytes(damage.flipped(data, SEED, number))
         start = time.monotonic()
         packets, _ = read_all(flipped_file)
         assert time.monotonic() - start < 10
-        last = -(1 << 63)
-        for packet in packets:
-            assert np.all(np.diff(packet.t_us) >= 0)
-            assert packet.t_us[0] >= last
-            assert packet.x.max() < SIZE[0]
-            assert packet.y.max() < SIZE[1]
-            last = packet.t_us[-1]
+        damage.check(packets, SIZE)
+
+
+@pytest.mark.parametrize("kind", ["cut", "flip"])
+@pytest.mark.parametrize("form", sorted(ISOLATED))
+def test_damage_that_the_decoder_may_not_survive(form: str, kind: str, tmp_path: Path) -> None:
+    """What brings the decoder down is read again as users read it: in a process that may die."""
+    path = MAKERS[form](tmp_path, some_events(500))
+    data, first, count = path.read_bytes(), 0, CUTS if kind == "cut" else FLIPS
+    while first < count:
+        arguments = [ISOLATED[form], str(path), kind, str(SEED), str(first), str(count)]
+        worker = [sys.executable, str(Path(damage.__file__)), *arguments]
+        try:
+            answer = subprocess.run(worker, capture_output=True, text=True, timeout=60 + count / 10)
+            said, survived = answer.stdout, answer.returncode >= 0
+            assert answer.returncode <= 0, answer.stderr[-2000:]
+        except subprocess.TimeoutExpired as late:
+            said, survived = (late.stdout or b"").decode(), False
+        first = int(said.split()[-1]) + 1
+        if not survived:
+            bad = tmp_path / f"bad{path.suffix}"
+            bad.write_bytes(damage.damaged(data, kind, SEED, first - 1, count))
+            packets, error = read_all(bad)
+            assert isinstance(error, RecordingError)
+            damage.check(packets, SIZE)
 
 
 def test_a_cut_inside_a_word_is_said(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -108,9 +109,20 @@ def test_a_decoder_that_hangs_or_crashes_is_an_error(tmp_path: Path, monkeypatch
     monkeypatch.setattr(_isolated, "PATIENCE_S", 0.01)
     with pytest.raises(DamagedRecordingError, match="gave nothing"):
         open_recording(path)
-    monkeypatch.setattr(_isolated, "PATIENCE_S", 8.0)
+    monkeypatch.undo()
     with pytest.raises(DamagedRecordingError, match="crashed"):
         _isolated.isolated("no_such_reader", path, _isolated.Hints())
+
+
+def test_a_decoder_that_works_without_end_is_stopped(tmp_path: Path) -> None:
+    """In a process of its own, whose limit is a moment; waiting is not working, and is not stopped."""
+    code = (
+        "import time; from evplace.readers import _isolated\n"
+        "_isolated.WORK_S = 0.2; _isolated._limit_work(); time.sleep(0.5); print('waited', flush=True)\n"
+        "while True: pass"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (answer.stdout, answer.returncode) == ("waited\n", -signal.SIGPROF)
 
 
 def test_a_filter_that_is_missing_is_named(tmp_path: Path) -> None:
@@ -130,3 +142,23 @@ def test_a_filter_that_is_missing_is_named(tmp_path: Path) -> None:
         [sys.executable, "-c", code, str(tmp_path / "b.h5")], capture_output=True, text=True
     )
     assert "pip install 'evplace[hdf5]'" in answer.stderr
+
+
+def test_a_file_whose_writer_was_killed(tmp_path: Path) -> None:
+    """Neither format survives it: HDF5 keeps its tables, and Parquet its footer, until the file is closed."""
+    code = (
+        "import os, sys, h5py, numpy as np\n"
+        "file = h5py.File(sys.argv[1], 'w')\n"
+        "for name in 'txyp': file.create_dataset(f'events/{name}', data=np.arange(100_000), chunks=(1000,))\n"
+        "os.kill(os.getpid(), 9)"
+    )
+    subprocess.run([sys.executable, "-c", code, str(tmp_path / "killed.h5")])
+    assert (tmp_path / "killed.h5").stat().st_size > 0
+    with pytest.raises(RecordingError, match=r"damaged HDF5 file|no known recording format"):
+        open_recording(tmp_path / "killed.h5", (240, 180))
+
+
+@pytest.mark.parametrize("signs", [(0, 1), (-1, 1), (False, True)])
+def test_polarities_of_every_kind(signs: tuple[int, int], tmp_path: Path) -> None:
+    entries = rows(SOME.t_us, "events") | {"events__p": np.array(signs)[SOME.p.astype(int)], "ms_to_idx": [0]}
+    assert np.array_equal(read(written(tmp_path / "p.h5", **entries), size=(240, 180)).p, SOME.p)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made import MAKERS, SIZE, aedat3, ros1_bag, ros2_mcap, some_events
+from made import MAKERS, SIZE, aedat3, packet_messages, ros1_bag, ros2_mcap, some_events
 
 from evplace.errors import DamagedRecordingError, RecordingError
 from evplace.events import Events
@@ -104,3 +104,29 @@ def test_a_bag_without_messages_says_so(tmp_path: Path) -> None:
     path = ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [])
     with pytest.raises(RecordingError, match="no message at all"):
         open_recording(path)
+
+
+def test_a_parquet_file_whose_writer_was_killed(tmp_path: Path) -> None:
+    files = pytest.importorskip("pyarrow.parquet")
+    pyarrow = pytest.importorskip("pyarrow")
+    table = pyarrow.table({"t_us": SOME.t_us, "x": SOME.x, "y": SOME.y, "p": SOME.p})
+    writer = files.ParquetWriter(tmp_path / "whole.parquet", table.schema)
+    writer.write_table(table)
+    (tmp_path / "killed.parquet").write_bytes((tmp_path / "whole.parquet").read_bytes())
+    writer.close()
+    assert (tmp_path / "killed.parquet").read_bytes().startswith(b"PAR1")
+    with pytest.raises(RecordingError, match="damaged Parquet file"):
+        open_recording(tmp_path / "killed.parquet")
+
+
+def test_an_mcap_file_without_chunks(tmp_path: Path) -> None:
+    writer = pytest.importorskip("mcap.writer")
+    with (tmp_path / "plain.mcap").open("wb") as file:
+        out = writer.Writer(file, use_chunking=False)
+        out.start("ros2", "test")
+        schema = out.register_schema("event_camera_msgs/msg/EventPacket", "ros2msg", b"")
+        channel = out.register_channel("/events", "cdr", schema)
+        for message in packet_messages(SOME, aligned=True):
+            out.add_message(channel, log_time=0, publish_time=0, data=message)
+        out.finish()
+    assert sum(map(len, open_recording(tmp_path / "plain.mcap").packets())) == len(SOME)

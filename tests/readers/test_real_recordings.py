@@ -59,3 +59,32 @@ def test_same_events_as_faery(data: Path, name: str) -> None:
     theirs = np.concatenate(list(faery.events_stream_from_file(path)))
     for field, name_there in (("t_us", "t"), ("x", "x"), ("y", "y"), ("p", "p")):
         assert np.array_equal(getattr(ours, field), theirs[name_there].astype(getattr(ours, field).dtype))
+
+
+def test_same_events_as_eventcv(data: Path) -> None:
+    """Of AEDAT 2, whose columns run from the right in the file: jAER and we turn them, eventcv does not."""
+    eventcv = pytest.importorskip("eventcv", reason="eventcv, of the extra 'bench', is not installed")
+    path = data / "events" / "davis240c_translBoxes.aedat"
+    ours = Events.concatenate(list(open_recording(path).packets()))
+    theirs = eventcv.load(str(path)).numpy().astype(np.int64)  # (N, 4): x, y, t, p
+    assert np.array_equal(np.stack([239 - ours.x, ours.y, ours.t_us, ours.p], axis=1), theirs)
+
+
+@pytest.mark.parametrize("name", ["evt3_packets_640x480.bag", "evt3_packets_640x480_ros2"])
+def test_same_events_as_rosbags_and_faery(data: Path, name: str, tmp_path: Path) -> None:
+    """The bag by rosbags; the camera's own words in its messages, as a raw file, by faery."""
+    faery, rosbags = pytest.importorskip("faery"), pytest.importorskip("rosbags.highlevel")
+    types = pytest.importorskip("rosbags.typesys")
+    path, raw = data / "events" / name, tmp_path / "words.raw"
+    words = []
+    store = types.get_typestore(types.Stores.ROS2_HUMBLE)
+    with rosbags.AnyReader([path], default_typestore=store) as bag:
+        for connection, _, message in bag.messages():
+            if connection.msgtype.startswith("event_camera"):
+                words.append(bytes(bag.deserialize(message, connection.msgtype).events))
+    raw.write_bytes(b"% evt 3.0\n% format EVT3;height=480;width=640\n% end\n" + b"".join(words))
+    theirs = np.concatenate(list(faery.events_stream_from_file(raw)))
+    ours = Events.concatenate(list(open_recording(path).packets()))
+    for field, name_there in (("x", "x"), ("y", "y"), ("p", "p")):
+        assert np.array_equal(getattr(ours, field), theirs[name_there].astype(getattr(ours, field).dtype))
+    assert np.array_equal(np.diff(ours.t_us), np.diff(theirs["t"].astype(np.int64)))

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from evplace.cleaning._pixels import Mask, count_pixels, hot_pixels, static_pixels
 from evplace.cleaning._settings import CleaningSettings
-from evplace.errors import DamagedRecordingError, RecordingError
+from evplace.errors import DamagedRecordingError, InputError, RecordingError
 from evplace.events import Events, Size
+from evplace.storage import read_array
 
 MaskSource = str | Path | NDArray[Any]
 """A file of pixels or of a mask, or the mask itself (H, W)."""
@@ -71,11 +72,10 @@ def _loaded(path: Path, name: str) -> NDArray[Any]:
     try:
         with path.open("rb") as file:
             is_array = file.read(6) == b"\x93NUMPY"
-        # Mapped, so that what a damaged header claims to hold is compared with the file, not allocated.
-        return np.load(path, mmap_mode="r", allow_pickle=False) if is_array else _pixels(path, name)
+        return read_array(path, name) if is_array else _pixels(path, name)
     except OSError as error:
         raise RecordingError(f"cannot read {name}: {error.strerror or error}") from error
-    except (ValueError, EOFError) as error:
+    except (InputError, ValueError) as error:
         raise RecordingError(f"{name} cannot be used: {error}") from error
 
 

@@ -46,6 +46,12 @@ def note(text: str) -> None:
     print(f"evplace: {text}", file=sys.stderr)
 
 
+def note_guesses(notes: object) -> None:
+    """What was guessed of a recording, a remark each; `notes` are its own or those that a traverse kept."""
+    for guess in notes if isinstance(notes, list) else []:
+        note(str(guess))
+
+
 @contextlib.contextmanager
 def remarks() -> Iterator[None]:
     """Warnings within the block as remarks, once it ends well."""

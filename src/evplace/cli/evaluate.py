@@ -20,7 +20,7 @@ import tyro
 from evplace import settings
 from evplace.capture import open_traverse
 from evplace.charts import curve_chart
-from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
+from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
 from evplace.errors import MissingExtraError, OutputError
 from evplace.images import ImageSettings
 from evplace.localizer import Localizer
@@ -94,6 +94,7 @@ def run(args: Args) -> int:
         print_json(result.figures)
     else:
         print_facts(str(args.out), {name: result.figures[name] for name in SHOWN if name in result.figures})
+    note_guesses(query.info.get("notes"))
     if query.info.get("fault"):
         note(f"{query.info['fault']}; what came before it was measured")
         return USED_GOOD_PART

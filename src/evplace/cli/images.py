@@ -23,7 +23,7 @@ import tyro
 
 from evplace.capture import open_source, record
 from evplace.cleaning import CleaningSettings
-from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json, remarks
+from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
 from evplace.images import ImageSettings
 from evplace.sheets import contact_sheet
 from evplace.spacing import SpacingSettings
@@ -98,6 +98,7 @@ def run(args: Args) -> int:
         print_json(facts)
     else:
         print_facts(str(args.out), facts)
+    note_guesses(traverse.info.get("notes"))
     if fault is not None:
         note(f"{fault}; the images before it were written")
     return USED_GOOD_PART if fault is not None else 0

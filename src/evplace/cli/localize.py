@@ -23,7 +23,7 @@ import tyro
 
 from evplace import settings
 from evplace.cleaning import pixel_mask
-from evplace.cli._output import USED_GOOD_PART, note
+from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.errors import DamagedRecordingError
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
@@ -74,6 +74,7 @@ class _Drive:
             yield from self._where.match_traverse(Traverse.load(self._args.drive))
             return
         recording = open_recording(self._args.drive, self._args.size, time_unit=self._args.time_unit)
+        note_guesses(recording.notes)
         where = self._where
         where.mask = pixel_mask(recording.packets(), recording.size, where.cleaning, where.mask)
         try:

@@ -22,7 +22,7 @@ import tyro
 from evplace import settings as settings_room
 from evplace.capture import open_traverse
 from evplace.cleaning import CleaningSettings
-from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json, progress
+from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
 from evplace.errors import OutputError, TraverseError
 from evplace.images import ImageSettings
 from evplace.places import PlaceGrid, PlaceRuns, Places
@@ -105,6 +105,7 @@ def run(args: Args) -> int:
         "seconds": round(seconds, 1),
     }
     print_json(facts) if args.json else print_facts(str(args.out), facts)
+    note_guesses(day.info.get("notes"))
     if day.info.get("fault"):
         note(f"{day.info['fault']}; what came before it was learned")
         return USED_GOOD_PART

@@ -99,7 +99,7 @@ class Result:
         folder = Path(path)
         try:
             summary = storage.read_json(folder / "result.json", "a result")
-            curve = np.load(folder / "pr_curve.npy", allow_pickle=False).reshape(-1, len(CURVE))
+            curve = storage.read_array(folder / "pr_curve.npy", "a result").reshape(-1, len(CURVE))
             answers, columns = _read_matches(folder / "matches.csv")
             images = _kept(folder / "samples.npy")
             samples = Samples.of(summary["samples"], images) if images is not None else None
@@ -134,8 +134,7 @@ def _kept(path: Path, memory_mapped: bool = False) -> NDArray[Any] | None:
     """The array in a file that a result may lack."""
     if not path.exists():
         return None
-    array: NDArray[Any] = np.load(path, mmap_mode="r" if memory_mapped else None, allow_pickle=False)
-    return array
+    return storage.read_array(path, "a result", memory_mapped)
 
 
 def _check_fit(result: Result) -> None:

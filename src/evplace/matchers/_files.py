@@ -25,7 +25,7 @@ def open_scores(path: FilePath) -> NDArray[Any]:
         table = np.lib.format.open_memmap(path, mode="r")
     except OSError as error:
         raise ScoresError(f"cannot read scores from {path}: {error.strerror or error}") from error
-    except (ValueError, EOFError) as error:
+    except (ValueError, EOFError, OverflowError) as error:
         raise ScoresError(
             f"{path} is not a whole .npy file of numbers ({error}): write it with numpy.save"
         ) from error

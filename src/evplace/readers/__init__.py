@@ -17,12 +17,15 @@ size and cuts packets, for all formats alike (the rules stand in `_checks`).
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from evplace import plugs
 from evplace.errors import RecordingError
 from evplace.events import Size
-from evplace.readers._recording import Recording
 from evplace.readers._source import Block, Hints, Source
+
+if TYPE_CHECKING:
+    from evplace.readers._recording import Recording
 
 __all__ = ["Block", "Hints", "Recording", "Source", "is_recording", "open_recording"]
 
@@ -40,6 +43,8 @@ def open_recording(
     for formats that do not say. Raises RecordingError where the file is missing, empty or of no known
     format, or its header cannot be used; SettingsError for a `format` that does not exist.
     """
+    from evplace.readers._recording import Recording
+
     file = Path(path)
     if size is not None and (min(size) < 1 or max(size) > 1 << 16):
         raise RecordingError(f"the size {size[0]}x{size[1]} is none a sensor can have: give width and height")
@@ -53,6 +58,15 @@ def open_recording(
     except OSError as error:
         raise RecordingError(f"cannot read {file} as {name}: {error.strerror or error}") from error
     return Recording(file, name, source, size)
+
+
+def __getattr__(name: str) -> Any:
+    """Recording, on first use: the child processes that only decode start in half the time without it."""
+    if name != "Recording":
+        raise AttributeError(f"module 'evplace.readers' has no attribute '{name}'")
+    from evplace.readers._recording import Recording
+
+    return Recording
 
 
 def is_recording(path: Path) -> bool:

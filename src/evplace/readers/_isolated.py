@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import signal
 import struct
 import subprocess
 import sys
@@ -24,12 +25,17 @@ from evplace import errors
 from evplace.errors import DamagedRecordingError, EvplaceError
 from evplace.readers._source import Block, Hints, Source
 
-PATIENCE_S = 8.0
-"""Seconds in which a block of events must come; beyond that the child hangs."""
+WORK_S = 8.0
+"""Seconds of its own work within which the child gives a block; beyond that it goes round in circles. They
+are counted where the system can: a busy machine must not make a good recording look damaged."""
+PATIENCE_S = 120.0
+"""Seconds by the clock within which a block must come; beyond that the child waits for ever."""
 MEMORY = 4 << 30
 """Bytes of address space that the child may take, where the system can limit it; a block needs far less."""
 SLICE = 1 << 19
 """Events that a message carries at most."""
+PIPE = 1 << 20
+"""Bytes that the pipe holds, where the system lets it be set: the two processes then rarely wait."""
 _FRAME = struct.Struct("<cqq")
 """Kind (H header, B block, E end), then two numbers: bytes and 0, or events and untimed events."""
 
@@ -60,6 +66,7 @@ class _Child:
             stdout=subprocess.PIPE,
             stdin=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            pipesize=PIPE if sys.platform == "linux" else -1,
         )
 
     def messages(self) -> Iterator[dict[str, Any] | Block]:
@@ -80,7 +87,10 @@ class _Child:
             return _message(self._process.stdout)
         except EOFError:
             late = watchdog.finished.is_set()
-            reason = f"it gave nothing for {seconds:g} s" if late else "it crashed"
+            self._process.kill()  # which does nothing to one that has ended: its code stays what it was
+            endless = self._process.wait() == -getattr(signal, "SIGPROF", 0)
+            waited = WORK_S if endless else seconds
+            reason = f"it gave nothing for {waited:g} s" if late or endless else "it crashed"
             raise DamagedRecordingError(
                 f"{self._path} is damaged: its decoder was stopped, as {reason}"
             ) from None
@@ -121,6 +131,7 @@ def serve() -> None:
     """The child: decode what the arguments name, and write messages to the standard output."""
     wanted = json.loads(sys.argv[1])
     _limit_memory()
+    _limit_work()
     pipe = sys.stdout.buffer
     try:
         reader = importlib.import_module(f"evplace.readers.{wanted['reader']}")
@@ -144,6 +155,12 @@ def _limit_memory() -> None:
             resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
+def _limit_work() -> None:
+    """Have the system end this process after WORK_S seconds of work from now on, even within C code."""
+    if sys.platform != "win32":
+        signal.setitimer(signal.ITIMER_PROF, WORK_S)
+
+
 def _send(pipe: IO[bytes], kind: bytes, value: dict[str, Any]) -> None:
     data = json.dumps(value).encode()
     pipe.write(_FRAME.pack(kind, len(data), 0) + data)
@@ -158,3 +175,4 @@ def _send_block(pipe: IO[bytes], block: Block) -> None:
         for field in block[:4]:
             pipe.write(np.ascontiguousarray(field[part]).data)
     pipe.flush()
+    _limit_work()

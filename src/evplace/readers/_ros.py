@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from evplace.errors import DamagedRecordingError, RecordingError
@@ -24,9 +25,14 @@ PACKED = np.dtype([("x", "<u2"), ("y", "<u2"), ("s", "<u4"), ("ns", "<u4"), ("p"
 """An event of an EventArray in ROS 1."""
 ALIGNED = np.dtype(
     {"names": ["x", "y", "s", "ns", "p"], "formats": ["<u2", "<u2", "<u4", "<u4", "u1"],
-     "offsets": [0, 2, 6, 10, 14], "itemsize": 16}
+     "offsets": [0, 2, 6, 10, 14], "itemsize": 15}
 )  # fmt: skip
-"""An event of an EventArray in ROS 2 that starts two bytes off a multiple of four."""
+"""An event of an EventArray in ROS 2 that starts two bytes off a multiple of four; the next is STEP away."""
+STEP = 16
+
+
+Bytes = bytes | memoryview
+"""Views, where a message is a part of something larger: it is not copied before it is decoded."""
 
 
 class Message(NamedTuple):
@@ -35,13 +41,13 @@ class Message(NamedTuple):
     topic: str
     kind: str
     """The type without `/msg`, for example "dvs_msgs/EventArray"."""
-    data: bytes
+    data: Bytes
 
 
 class Fields:
     """Takes the fields of a serialised message one after the other; struct.error where it is too short."""
 
-    def __init__(self, data: bytes, aligned: bool) -> None:
+    def __init__(self, data: Bytes, aligned: bool) -> None:
         self.data = data
         self.position = 4 if aligned else 0
         self._aligned = aligned
@@ -57,7 +63,7 @@ class Fields:
         self.position += width
         return value
 
-    def raw(self) -> bytes:
+    def raw(self) -> Bytes:
         """A counted run of bytes."""
         length = self.take("I")
         start = self.position
@@ -109,7 +115,7 @@ def _opened(path: Path, messages: Callable[[], Iterator[Message]], first: Messag
 
 
 def _decoded(
-    path: Path, messages: Callable[[], Iterator[Message]], topic: str, decode: Callable[[bytes], Block]
+    path: Path, messages: Callable[[], Iterator[Message]], topic: str, decode: Callable[[Bytes], Block]
 ) -> Iterator[Block]:
     for number, message in enumerate(messages()):
         if message.topic == topic:
@@ -127,13 +133,13 @@ class _Packets:
         self._encodings: dict[str, Encoding] = {}
         self._shift_us: int | None = None
 
-    def __call__(self, data: bytes) -> Block:
+    def __call__(self, data: Bytes) -> Block:
         fields = Fields(data, self._aligned)
         stamp_ns = fields.header()
         for kind in "IIQ":  # height, width, seq
             fields.take(kind)
         base_ns = fields.take("Q")
-        name = fields.raw().rstrip(b"\0").decode("ascii", "replace")
+        name = bytes(fields.raw()).rstrip(b"\0").decode("ascii", "replace")
         fields.take("B")
         block = self._encoding(name)(fields.raw(), base_ns)
         if self._shift_us is None and len(block.t_us):
@@ -154,7 +160,7 @@ class _Arrays:
     def __init__(self, aligned: bool) -> None:
         self._aligned = aligned
 
-    def __call__(self, data: bytes) -> Block:
+    def __call__(self, data: Bytes) -> Block:
         fields = Fields(data, self._aligned)
         fields.header()
         fields.take("I"), fields.take("I")
@@ -168,17 +174,31 @@ class _Arrays:
         return _block(_aligned_events(data, count, start))
 
 
-def _aligned_events(data: bytes, count: int, start: int) -> NDArray[Any]:
+def _aligned_events(data: Bytes, count: int, start: int) -> NDArray[Any]:
     """`count` events of ROS 2; the last one lacks the byte that fills it up."""
-    if start + count * ALIGNED.itemsize > len(data) + 1:
+    if start + count * STEP > len(data) + 1:
         raise ValueError(f"it claims {count} events")
-    return np.frombuffer(data + b"\0", ALIGNED, count, min(start, len(data)))
+    return np.ndarray((count,), ALIGNED, data, min(start, len(data)), (STEP,))
 
 
 def _block(events: NDArray[Any]) -> Block:
-    return Block(
-        events["s"].astype(np.int64) * 1_000_000 + events["ns"] // 1000,
-        events["x"].astype(np.uint16),
-        events["y"].astype(np.uint16),
-        events["p"].astype(np.bool_),
-    )
+    count = len(events)
+    t_us, x, y = np.empty(count, np.int64), np.empty(count, np.uint16), np.empty(count, np.uint16)
+    p = np.empty(count, np.bool_)
+    _split(events, t_us, x, y, p)
+    return Block(t_us, x, y, p)
+
+
+@njit(cache=True)
+def _split(
+    events: NDArray[Any],
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.bool_],
+) -> None:
+    """Fill the arrays from structs of either layout."""
+    for i in range(len(events)):
+        event = events[i]
+        t_us[i] = np.int64(event["s"]) * 1_000_000 + np.int64(event["ns"]) // 1000
+        x[i], y[i], p[i] = event["x"], event["y"], event["p"] != 0

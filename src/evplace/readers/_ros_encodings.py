@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from evplace.readers._source import Block
 from evplace.readers.evt3 import Decoder
 
-Encoding = Callable[[bytes, int], Block]
+Encoding = Callable[[bytes | memoryview, int], Block]
 """A packet's bytes and its time_base in ns -> events; remembers what the next packet needs."""
 SINCE_EPOCH = ("libcaer",)
 """Encodings whose times count from 1970; the others count from the camera's own start."""
@@ -28,7 +28,7 @@ def evt3() -> Encoding:
 def mono() -> Encoding:
     """64 bits an event: 32 of time since time_base (ns), 16 of x, 15 of y, the polarity."""
 
-    def decode(data: bytes, base_ns: int) -> Block:
+    def decode(data: bytes | memoryview, base_ns: int) -> Block:
         words = _words(data, "<u8")
         t_ns = (words & np.uint64(0xFFFFFFFF)).astype(np.int64) + _ns(base_ns)
         x, y = words >> np.uint64(32) & np.uint64(0xFFFF), words >> np.uint64(48) & np.uint64(0x7FFF)
@@ -40,7 +40,7 @@ def mono() -> Encoding:
 def libcaer() -> Encoding:
     """Two 32-bit words an event: polarity, y and x above a flag; then 31 bits of microseconds that wrap."""
 
-    def decode(data: bytes, base_ns: int) -> Block:
+    def decode(data: bytes | memoryview, base_ns: int) -> Block:
         words = _words(data, "<u4")
         pixel, low = words[: len(words) // 2 * 2 : 2], words[1::2].astype(np.int64) & 0x7FFFFFFF
         wraps = np.cumsum(np.diff(low, prepend=low[:1]) < -(1 << 30), dtype=np.int64)
@@ -55,7 +55,7 @@ ENCODINGS = {"evt3": evt3, "mono": mono, "libcaer": libcaer}
 """By the name in the message."""
 
 
-def _words(data: bytes, kind: str) -> NDArray[np.unsignedinteger]:
+def _words(data: bytes | memoryview, kind: str) -> NDArray[np.unsignedinteger]:
     return np.frombuffer(data, kind, len(data) // np.dtype(kind).itemsize)
 
 

@@ -51,15 +51,20 @@ class Source:
     """The time at which a clock that turns read 0."""
 
 
-def gathered(blocks: Iterator[Block], events: int = 1 << 17) -> Iterator[Block]:
-    """Small blocks joined into blocks of at least `events` events; what is held comes out before a fault."""
+def gathered(blocks: Iterator[Block], events: int = 1 << 15) -> Iterator[Block]:
+    """Small blocks joined into blocks of at least `events` events; what is held comes out before a fault.
+
+    Much larger ones would not stay in the processor's cache until they are checked.
+    """
     held: list[Block] = []
+    count = 0
     try:
         for block in blocks:
             held.append(block)
-            if sum(len(part.t_us) for part in held) >= events:
+            count += len(block.t_us)
+            if count >= events:
                 yield joined(held)
-                held = []
+                held, count = [], 0
     except Exception:
         if held:
             yield joined(held)

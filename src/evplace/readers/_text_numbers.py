@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-NEWLINE, MINUS, PLUS, DOT, HASH = ord("\n"), ord("-"), ord("+"), ord("."), ord("#")
+NEWLINE, RETURN, MINUS, PLUS, DOT, HASH = ord("\n"), ord("\r"), ord("-"), ord("+"), ord("."), ord("#")
 DIGITS = 18
 """Digits that 64 bits hold; further ones are beyond any clock."""
 TENS = 10 ** np.arange(DIGITS + 1, dtype=np.int64)
@@ -22,31 +22,91 @@ def parse(
     the first line that is neither empty, nor a remark (#), nor such a row.
     """
     whole, fraction = np.empty((rows, columns), np.int64), np.empty((rows, columns), np.int64)
-    count, i, lines, size = 0, 0, 0, len(text)
-    while i < size and count < rows:
-        start, column, good = i, 0, True
-        while i < size and text[i] != NEWLINE:
-            if _blank(text[i]):
+    count, i, lines = 0, 0, 0
+    while i < len(text) and count < rows:
+        taken, i = _plain_rows(text, i, columns, whole[count:], fraction[count:])
+        count, lines = count + taken, lines + taken
+        if i == len(text) or count == rows:
+            break
+        numbers, end = _row(text, i, columns, whole[count], fraction[count])
+        if numbers != columns and numbers != 0:
+            break
+        count, lines, i = count + (numbers == columns), lines + 1, end
+    return whole[:count], fraction[:count], i, lines
+
+
+@njit(cache=True)
+def _plain_rows(
+    text: NDArray[np.uint8],
+    start: int,
+    columns: int,
+    whole: NDArray[np.int64],
+    fraction: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Rows as nearly all are, at four times the speed of `_row`; stops before one that is not so.
+
+    One blank stands between two numbers, which are short and without exponent. As the text ends with a
+    newline, no look at its end is needed.
+    """
+    row, i = 0, start
+    while row < len(whole) and i < len(text):
+        begin = i
+        for column in range(columns):
+            negative = text[i] == MINUS
+            i += negative
+            first, value, part, places = i, np.int64(0), np.int64(0), 0
+            digit = np.int64(text[i]) - 48
+            while 0 <= digit <= 9:
+                value = value * 10 + digit
                 i += 1
-            elif text[i] == HASH and column == 0:
-                while i < size and text[i] != NEWLINE:
+                digit = np.int64(text[i]) - 48
+            digits = i - first
+            if text[i] == DOT:
+                i += 1
+                first = i
+                digit = np.int64(text[i]) - 48
+                while 0 <= digit <= 9:
+                    part = part * 10 + digit
                     i += 1
-            elif column == columns:
-                good = False
-                break
-            else:
-                end, whole[count, column], fraction[count, column] = _number(text, i)
-                if end == i or (end < size and text[end] != NEWLINE and not _blank(text[end])):
-                    good = False
-                    break
-                i = end
-                column += 1
-        if not good or (column != columns and column != 0):
-            return whole[:count], fraction[:count], start, lines
-        count += column == columns
-        lines += 1
-        i += 1
-    return whole[:count], fraction[:count], min(i, size), lines
+                    digit = np.int64(text[i]) - 48
+                places = i - first
+            i += column == columns - 1 and text[i] == RETURN
+            fits = 0 < digits + places < DIGITS and places <= 9
+            if not fits or not (_blank(text[i]) if column < columns - 1 else text[i] == NEWLINE):
+                return row, begin
+            part *= TENS[9 - places]
+            whole[row, column] = -value - (part > 0) if negative else value
+            fraction[row, column] = 1_000_000_000 - part if negative and part > 0 else part
+            i += 1
+        row += 1
+    return row, i
+
+
+@njit(cache=True)
+def _row(
+    text: NDArray[np.uint8],
+    start: int,
+    columns: int,
+    whole: NDArray[np.int64],
+    fraction: NDArray[np.int64],
+) -> tuple[int, int]:
+    """How many numbers the line at `start` has (-1 where it is no row or remark), and the byte after it."""
+    i, column, size = start, 0, len(text)
+    while i < size and text[i] != NEWLINE:
+        if _blank(text[i]):
+            i += 1
+        elif text[i] == HASH and column == 0:
+            while i < size and text[i] != NEWLINE:
+                i += 1
+        elif column == columns:
+            return -1, start
+        else:
+            end, whole[column], fraction[column] = _number(text, i)
+            if end == i or (end < size and text[end] != NEWLINE and not _blank(text[end])):
+                return -1, start
+            i = end
+            column += 1
+    return column, min(i + 1, size)
 
 
 @njit(cache=True)

@@ -45,11 +45,10 @@ def _lz4(data: bytes, limit: int) -> bytes:
 
 
 def _zstd(data: bytes, limit: int) -> bytes:
+    if 0 < zstandard.frame_content_size(data) <= limit:  # stated and possible: in one go
+        return zstandard.ZstdDecompressor(max_window_size=LIMIT).decompress(data)
     with zstandard.ZstdDecompressor(max_window_size=LIMIT).stream_reader(io.BytesIO(data)) as reader:
-        whole = reader.read(limit + 1)
-    if len(whole) < zstandard.frame_content_size(data) <= limit:
-        raise EOFError("it ends too early")
-    return whole
+        return reader.read(limit + 1)
 
 
 def _bz2(data: bytes, limit: int) -> bytes:

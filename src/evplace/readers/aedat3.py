@@ -13,6 +13,8 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numba import njit
+from numpy.typing import NDArray
 
 from evplace.errors import DamagedRecordingError, RecordingError
 from evplace.readers._source import Block, Hints, Source, gathered
@@ -78,12 +80,27 @@ def _packets(path: Path, start: int) -> Iterator[Block]:
 
 def _block(data: bytes, count: int, wraps: int) -> Block:
     """The valid ones of `count` events: x, y, polarity and validity in one word, the time in the next."""
-    words = np.frombuffer(data, "<u4", 2 * count).reshape(-1, 2)
-    words = words[words[:, 0] & 1 == 1]
-    pixel = words[:, 0]
-    return Block(
-        words[:, 1].astype(np.int64) + (wraps << 31),
-        (pixel >> 17).astype(np.uint16),
-        (pixel >> 2 & 0x7FFF).astype(np.uint16),
-        (pixel >> 1 & 1).astype(np.bool_),
-    )
+    words = np.frombuffer(data, "<u4", 2 * count)
+    t_us, x, y = np.empty(count, np.int64), np.empty(count, np.uint16), np.empty(count, np.uint16)
+    p = np.empty(count, np.bool_)
+    valid = _split(words, wraps << 31, t_us, x, y, p)
+    return Block(t_us[:valid], x[:valid], y[:valid], p[:valid])
+
+
+@njit(cache=True)
+def _split(
+    words: NDArray[np.uint32],
+    start_us: int,
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.bool_],
+) -> int:
+    """Fill the arrays with the valid events; return how many they are."""
+    count = 0
+    for i in range(0, len(words), 2):
+        pixel = words[i]
+        t_us[count] = start_us + np.int64(words[i + 1])
+        x[count], y[count], p[count] = pixel >> 17, pixel >> 2 & 0x7FFF, pixel >> 1 & 1 == 1
+        count += pixel & 1
+    return count

@@ -24,8 +24,8 @@ CHANGE_EVENTS = (0x00, 0x0C)
 KINDS = (*CHANGE_EVENTS, 0x0E, 0x28)
 """All event types: the last two are triggers."""
 RECORD = np.dtype([("t", "<u4"), ("data", "<u4")])
-EVENTS = 1 << 19
-"""Events decoded at a time."""
+EVENTS = 1 << 16
+"""Events decoded at a time; with many more the processor's cache would not hold the steps in between."""
 
 
 def matches(path: Path, head: bytes) -> bool:

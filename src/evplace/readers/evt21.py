@@ -21,6 +21,9 @@ from evplace.readers._source import Block, Hints, Source
 ABOUT = "Prophesee raw file, EVT 2.1"
 WORDS = 1 << 17
 """Words decoded at a time; a word gives 32 events at most."""
+POSITION = np.zeros(37, np.int64)
+"""2 ** n modulo 37 -> n: the powers of two up to 2 ** 31 all leave another rest."""
+POSITION[[(1 << n) % 37 for n in range(32)]] = range(32)
 
 
 def matches(path: Path, head: bytes) -> bool:
@@ -78,11 +81,12 @@ def _decode(
         word = np.int64(unsigned & np.uint64(0x0FFFFFFFFFFFFFFF))
         if kind <= 1:
             time = shift_us + (high << 6 | word >> 54 & 0x3F)
-            for bit in range(32):
-                if word >> bit & 1 == 0:
-                    continue
+            bits = word & 0xFFFFFFFF
+            while bits:
+                lowest = bits & -bits
+                bits ^= lowest
                 if timed:
-                    t_us[count], x[count] = time, (word >> 43 & 0x7FF) + bit
+                    t_us[count], x[count] = time, (word >> 43 & 0x7FF) + POSITION[lowest % 37]
                     y[count], p[count] = word >> 32 & 0x7FF, kind == 1
                     count += 1
                 else:

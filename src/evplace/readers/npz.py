@@ -26,6 +26,8 @@ from evplace.readers._source import Block, Hints, Source
 ABOUT = "numpy archive (.npz) with arrays t, x, y, p"
 EVENTS = 1 << 19
 """Events read at a time."""
+SAMPLE = 1 << 14
+"""Events from whose times the unit is told."""
 FAULTS = (
     zipfile.BadZipFile,
     zlib.error,
@@ -60,7 +62,7 @@ def read(path: Path, hints: Hints) -> Source:
             dtypes = {name: _dtype(archive, name) for name in _members(archive)}
             layout = _layout(path, dtypes)
             size = _size(archive, dtypes)
-        with closing(_columns_of(path, layout)) as slices:
+        with closing(_columns_of(path, layout, SAMPLE)) as slices:
             sample = next(slices)["t"]
     except StopIteration:
         sample = np.empty(0, np.int64)
@@ -133,8 +135,10 @@ def _size(archive: zipfile.ZipFile, dtypes: _Dtypes) -> Size | None:
     return (size[0], size[1]) if min(size) > 0 and max(size) <= 1 << 16 else None
 
 
-def _columns_of(path: Path, layout: _Layout) -> Generator[dict[str, NDArray[Any]], None, None]:
-    """Slices of the four fields, read from the members side by side."""
+def _columns_of(
+    path: Path, layout: _Layout, events: int = EVENTS
+) -> Generator[dict[str, NDArray[Any]], None, None]:
+    """Slices of the four fields, `events` long, read from the members side by side."""
     with ExitStack() as stack:
         archive = stack.enter_context(zipfile.ZipFile(path))
         members = {
@@ -143,7 +147,7 @@ def _columns_of(path: Path, layout: _Layout) -> Generator[dict[str, NDArray[Any]
         }
         left = min(shape[0] if shape else 0 for _, _, shape in members.values())
         while left > 0:
-            count = min(left, EVENTS)
+            count = min(left, events)
             parts = {name: _slice(file, dtype, count) for name, (file, dtype, _) in members.items()}
             yield {f: parts[m] if name is None else parts[m][name] for f, (m, name) in layout.items()}
             left -= count

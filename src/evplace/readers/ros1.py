@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from evplace.errors import DamagedRecordingError
-from evplace.readers._ros import Message, source
+from evplace.readers._ros import Bytes, Message, source
 from evplace.readers._source import Hints, Source
 from evplace.readers._unpack import LIMIT, UnpackError, unpack
 
@@ -73,23 +73,23 @@ def _record(file: BinaryIO, size: int) -> tuple[_Fields, bytes]:
 
 def _in_chunk(chunk: bytes, connections: _Connections) -> Iterator[Message]:
     """The messages of an unpacked chunk."""
-    position = 0
+    position, view = 0, memoryview(chunk)
     while position < len(chunk):
         parts = []
         for _ in range(2):
             length = struct.unpack_from("<I", chunk, position)[0]
-            parts.append(chunk[position + 4 : position + 4 + length])
+            parts.append(view[position + 4 : position + 4 + length])
             position += 4 + length
         if position > len(chunk):
             raise ValueError(f"a record inside a chunk ends {position - len(chunk)} bytes after it")
-        fields = _fields(parts[0])
+        fields = _fields(bytes(parts[0]))
         yield from _taken(fields[b"op"][0], fields, parts[1], connections)
 
 
-def _taken(kind: int, fields: _Fields, data: bytes, connections: _Connections) -> Iterator[Message]:
+def _taken(kind: int, fields: _Fields, data: Bytes, connections: _Connections) -> Iterator[Message]:
     """Remember a connection, give a message, pass over the rest."""
     if kind == CONNECTION:
-        about = _fields(data)
+        about = _fields(bytes(data))
         connections[fields[b"conn"]] = (
             fields[b"topic"].decode("utf-8", "replace"),
             about[b"type"].decode("ascii", "replace"),

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from evplace.errors import DamagedRecordingError
-from evplace.readers._ros import Message, source
+from evplace.readers._ros import Bytes, Message, source
 from evplace.readers._source import Hints, Source
 from evplace.readers._unpack import LIMIT, UnpackError, unpack
 
@@ -87,14 +87,14 @@ def _in_chunk(data: bytes, names: _Names) -> Iterator[Message]:
     records = unpack(data[position + 8 : position + 8 + length], method or "none", min(size, LIMIT))
     if len(records) != size or (checksum and zlib.crc32(records) != checksum):
         raise ValueError("the checksum of a chunk is wrong")
-    position = 0
+    position, view = 0, memoryview(records)
     while position < len(records):
         kind, length = struct.unpack_from("<BQ", records, position)
-        yield from _taken(kind, records[position + 9 : position + 9 + length], names)
+        yield from _taken(kind, view[position + 9 : position + 9 + length], names)
         position += 9 + length
 
 
-def _taken(kind: int, data: bytes, names: _Names) -> Iterator[Message]:
+def _taken(kind: int, data: Bytes, names: _Names) -> Iterator[Message]:
     """Remember a schema or a channel, give a message."""
     if kind == SCHEMA:
         names.kinds[struct.unpack_from("<H", data)[0]] = _text(data, 2)[0].replace("/msg/", "/")
@@ -108,7 +108,7 @@ def _taken(kind: int, data: bytes, names: _Names) -> Iterator[Message]:
         yield Message(*names.channels[struct.unpack_from("<H", data)[0]], data[22:])
 
 
-def _text(data: bytes, position: int) -> tuple[str, int]:
+def _text(data: Bytes, position: int) -> tuple[str, int]:
     """A counted text and the byte after it."""
     length = struct.unpack_from("<I", data, position)[0]
-    return data[position + 4 : position + 4 + length].decode("utf-8", "replace"), position + 4 + length
+    return bytes(data[position + 4 : position + 4 + length]).decode("utf-8", "replace"), position + 4 + length

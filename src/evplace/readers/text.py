@@ -28,7 +28,7 @@ from evplace.readers._source import Block, Hints, Source
 from evplace.readers._text_numbers import parse
 
 ABOUT = "text, one event a line (.txt, .csv, also in .zip or .gz)"
-BYTES = 1 << 22
+BYTES = 1 << 20
 """Bytes parsed at a time."""
 HEAD = 1 << 14
 """Bytes that hold the first lines."""

@@ -23,6 +23,8 @@ class SimulatedRecording:
     """Draws the pixels' thresholds and the noise."""
     dropped: dict[str, int] = field(default_factory=dict)
     """Nothing is left out."""
+    notes: list[str] = field(default_factory=list)
+    """Nothing is guessed."""
 
     @property
     def path(self) -> Path:
