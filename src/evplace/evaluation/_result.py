@@ -98,8 +98,8 @@ class Result:
         """The result in a folder; EvaluationError where it is none or damaged."""
         folder = Path(path)
         try:
-            summary = storage.read_json(folder / "result.json", "a result")
-            curve = storage.read_array(folder / "pr_curve.npy", "a result").reshape(-1, len(CURVE))
+            summary = storage.read_json(folder / "result.json", f"the result in {folder}")
+            curve = storage.read_array(folder / "pr_curve.npy", f"the result in {folder}").reshape(-1, len(CURVE))
             answers, columns = _read_matches(folder / "matches.csv")
             images = _kept(folder / "samples.npy")
             samples = Samples.of(summary["samples"], images) if images is not None else None
@@ -134,7 +134,7 @@ def _kept(path: Path, memory_mapped: bool = False) -> NDArray[Any] | None:
     """The array in a file that a result may lack."""
     if not path.exists():
         return None
-    return storage.read_array(path, "a result", memory_mapped)
+    return storage.read_array(path, f"the result in {path.parent}", memory_mapped)
 
 
 def _check_fit(result: Result) -> None:
