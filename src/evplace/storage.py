@@ -65,12 +65,16 @@ def new_file(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def locked(target: Path) -> Iterator[None]:
-    """Hold the one writer's place for `target`; OutputError if another process holds it."""
-    target.parent.mkdir(parents=True, exist_ok=True)
+    """Hold the one writer's place for `target`; OutputError if another process holds it, or it cannot be."""
     lock = target.with_name(f".{target.name}.lock")
-    handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
     try:
-        if not _try_lock(handle):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise OutputError(f"cannot write {target}: {error.strerror or error}") from error
+    try:
+        # A lock on a file that its last owner has removed meanwhile is no lock.
+        if not (_try_lock(handle) and lock.exists() and os.path.samestat(os.fstat(handle), lock.stat())):
             raise OutputError(
                 f"{target} is being written by another process: wait for it, or write elsewhere"
             )

@@ -90,9 +90,12 @@ def test_a_killed_drive_is_made_again_and_ends_the_same(made: Path, tmp_path: Pa
     out = tmp_path / "set"
     generate(out, SMALL, workers=1, drives=[("day", 1)])
     job = {"out": str(out), "settings": to_dict(SMALL), "condition": "night", "path": 1}
-    command = [sys.executable, "-m", "evplace.city.worker", json.dumps(job)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment()) as process:
+    command, pipe = [sys.executable, "-m", "evplace.city.worker"], subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment()) as process:
+        assert process.stdin is not None
         assert process.stdout is not None
+        process.stdin.write(json.dumps(job) + "\n")
+        process.stdin.flush()
         process.stdout.readline()
         time.sleep(0.1)
         process.kill()

@@ -11,7 +11,7 @@ import pytest
 
 from evplace.city import CitySettings, generate
 from evplace.cli import main
-from evplace.errors import InputError, SettingsError
+from evplace.errors import InputError, OutputError, SettingsError
 from evplace.reproduction import Choice, ablations, figure5, real, reproduce, table2
 from evplace.reproduction._cases import Case
 from evplace.reproduction._cities import Cities
@@ -23,7 +23,7 @@ pytest.importorskip("torch", reason="the network needs the extra 'train'")
 
 SMALL = CitySettings(fps=10, route_length_m=60.0)
 TRAINING = {"steps": 4, "batch": 8}
-SOME = Choice(seeds=2, train=TRAINING, inputs=("events", "colour, all three", "edges of colour"))
+SOME = Choice(seeds=2, train=TRAINING, inputs=("events", "colour, augmented", "colour, both"))
 
 
 @pytest.fixture(scope="module")
@@ -45,13 +45,27 @@ def table(city: Path, out: Path) -> dict[str, Any]:
 
 def test_table_2_has_every_cell_by_both_rules(table: dict[str, Any], out: Path) -> None:
     rows = table["rows"]
-    assert len(rows) == 5 * len(SOME.inputs) * len(methods()) * 2
+    trained_methods = sum(method.scorer == "network" for method in methods().values())
+    assert len(rows) == 5 * (2 * len(methods()) + trained_methods) * 2  # augmenting is for training
     assert json.loads((out / "table2.json").read_text()) == table
     trained = [row for row in rows if row["trained"]]
     assert {row["seeds"] for row in trained} == {2}
     assert all(row["spread"] is not None and len(row["values"]) == 2 for row in trained)
     assert {row["spread"] for row in rows if not row["trained"]} == {None}
     assert all(0 <= row["mean"] <= 100 and 0 <= row["chance"] <= 100 for row in rows)
+
+
+def test_results_of_other_settings_are_not_taken_for_ours(
+    table: dict[str, Any], city: Path, out: Path
+) -> None:
+    """The kept results go by names; what they hold goes by the settings."""
+    kept = out / "results" / "night-1, events, global-max" / "result.json"
+    before = json.loads(kept.read_text())["settings"]["key"]
+    quick = Choice(1, {**TRAINING, "steps": 2}, ("events",))
+    reproduce("table2", out, city, choice=quick, workers=1)
+    assert json.loads(kept.read_text())["settings"]["key"] != before
+    assert reproduce("table2", out, city, choice=SOME, workers=1)["rows"] == table["rows"]
+    assert json.loads(kept.read_text())["settings"]["key"] == before
 
 
 def test_the_papers_numbers_stand_beside_ours(table: dict[str, Any]) -> None:
@@ -75,7 +89,7 @@ def test_results_of_the_first_seed_are_kept_whole(table: dict[str, Any], out: Pa
 
 def test_tables_are_printed(table: dict[str, Any]) -> None:
     made = list(table2.tables(table))
-    assert len(made) == 5
+    assert len(made) == 6
     assert all(len(row) == len(one.columns) for one in made for row in one.rows)
     assert "93.2" in made[0].rows[2][-1]
 
@@ -90,6 +104,7 @@ def test_nothing_is_run_twice_and_other_settings_are(
     assert json.loads(capsys.readouterr().out)["rows"] == table["rows"]
     assert {file: file.stat().st_mtime_ns for file in (out / "runs").iterdir()} == before
     (out / "runs" / sorted(before)[0].name).unlink()
+    (out / "results" / "night-1, events, global-max" / "result.json").unlink()
     again = reproduce("table2", out, city, choice=SOME)
     assert again["rows"] == table["rows"]  # what was lost is made again, and comes out the same
     case = table2.cases(Cities(city, out), SOME)[0]
@@ -113,14 +128,14 @@ def test_figure_5_has_a_curve_for_each_method(table: dict[str, Any], city: Path,
 
 
 def test_ablations_compare_with_the_same_seeds(city: Path, out: Path) -> None:
-    table = reproduce("ablations", out, city, choice=Choice(2, {**TRAINING, "epochs": 0}), workers=1)
+    table = reproduce("ablations", out, city, choice=Choice(2, {**TRAINING, "batch": 64}), workers=1)
     rows = table["rows"]
     assert {row["verdict"] for row in rows} <= {"better", "worse", "no effect seen"}
     assert [abs(row["effect"]) for row in rows] == sorted((abs(row["effect"]) for row in rows), reverse=True)
     for row in rows:
         assert row["effect"] == pytest.approx(row["mean"] - row["before"])
-        if row["verdict"] == "no effect seen":
-            assert abs(row["effect"]) <= max(row["spread"], row["before_spread"])
+        seen = abs(row["effect"]) > max(row["spread"], row["before_spread"])
+        assert seen == (row["verdict"] != "no effect seen")
 
 
 def test_images_made_anew_from_events_are_the_drives_own(city: Path, out: Path) -> None:
@@ -177,8 +192,23 @@ def test_wrong_wishes_are_one_clear_line(
         reproduce("table3", tmp_path, city)
     with pytest.raises(InputError, match="holds no drives: make them with evplace city"):
         reproduce("table2", tmp_path / "out", tmp_path)
-    with pytest.raises(SettingsError, match="unknown input 'sound': known are events"):
-        Choice(inputs=("sound",))
+    with pytest.raises(
+        SettingsError, match="'sound' is no input that table2 can be limited to: known are events"
+    ):
+        reproduce("table2", tmp_path / "out", city, choice=Choice(inputs=("sound",)))
+    with pytest.raises(SettingsError, match="known are none"):
+        reproduce("ablations", tmp_path / "out", city, choice=Choice(inputs=("events",)))
+    with pytest.raises(SettingsError, match="'seed' cannot be set for all"):
+        Choice(train={"seed": 7})
+    with pytest.raises(SettingsError, match="0 processes can do nothing"):
+        reproduce("table2", tmp_path / "out", city, workers=0)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match="cannot write"):
+        reproduce("table2", tmp_path / "file" / "out", city)
+    (tmp_path / "bare").mkdir()
+    (tmp_path / "bare" / "city.json").write_bytes((city / "city.json").read_bytes())
+    with pytest.raises(InputError, match="lacks day-1/ideal: make a city with all drives and sensors"):
+        reproduce("table2", tmp_path / "out", tmp_path / "bare")
     with pytest.raises(SettingsError, match="at least 1"):
         Choice(seeds=0)
     assert (

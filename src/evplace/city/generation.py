@@ -15,7 +15,7 @@ from evplace.city.town import build_town
 from evplace.city.warming import warm
 from evplace.errors import OutputError
 from evplace.settings import to_dict
-from evplace.storage import read_json, write_json
+from evplace.storage import new_file, read_json, write_json
 from evplace.workers import run_all
 
 SETTINGS_FILE = "city.json"
@@ -89,7 +89,8 @@ def _claim(folder: Path, settings: CitySettings) -> None:
         raise OutputError(f"{folder} is not empty and holds no drives: choose another folder")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write_json(file, wanted)
+        with new_file(file) as partial:
+            write_json(partial, wanted)
     except OSError as error:
         raise OutputError(f"cannot write {folder}: {error.strerror or error}") from error
 

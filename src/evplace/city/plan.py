@@ -35,7 +35,7 @@ class CitySettings:
     image_hz: int = 10
     """Images kept a second, of events and of colour at the same times."""
     dt: str = "1/30"
-    """Seconds of events in an image, as a fraction (paper: 1/30)."""
+    """Seconds of events in an image, as a fraction (paper: 1/60, 1/16 and 1/30 for its three data sets)."""
     most_gain: float = MOST_GAIN
     """Largest gain of the colour camera. At 4, a fixed camera's, nights are dark; 64 exposes them fully, with
     the noise that such a gain brings."""

@@ -1,4 +1,4 @@
-"""One drive in a process of its own: `python -m evplace.city.worker JOB`, see `generation`."""
+"""One drive in a process of its own, see `generation` and `evplace.workers`."""
 
 from __future__ import annotations
 

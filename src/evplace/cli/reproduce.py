@@ -40,7 +40,7 @@ class Args:
     seeds: int = 3
     """Trainings of each network."""
     inputs: tuple[str, ...] = ()
-    """Only these inputs, for example events colour; all if not given."""
+    """For table2 and figure5: only these inputs, for example events colour; all if not given."""
     set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
     """A setting of all trainings over the recipes', as name=value: for a quick look."""
     workers: int | None = None

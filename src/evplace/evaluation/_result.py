@@ -98,8 +98,9 @@ class Result:
         """The result in a folder; EvaluationError where it is none or damaged."""
         folder = Path(path)
         try:
-            summary = storage.read_json(folder / "result.json", f"the result in {folder}")
-            curve = storage.read_array(folder / "pr_curve.npy", f"the result in {folder}").reshape(-1, len(CURVE))
+            what = f"the result in {folder}"
+            summary = storage.read_json(folder / "result.json", what)
+            curve = storage.read_array(folder / "pr_curve.npy", what).reshape(-1, len(CURVE))
             answers, columns = _read_matches(folder / "matches.csv")
             images = _kept(folder / "samples.npy")
             samples = Samples.of(summary["samples"], images) if images is not None else None

@@ -13,16 +13,17 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NamedTuple
 
 from evplace import plugs
+from evplace.city import Progress as CityProgress
 from evplace.city import generate
 from evplace.errors import InputError, SettingsError
 from evplace.evaluation import versions
 from evplace.reproduction._cases import Case
 from evplace.reproduction._cities import Cities
 from evplace.reproduction._real_sets import RealSets
-from evplace.reproduction._recipes import inputs
 from evplace.reproduction._runs import Runs
 from evplace.storage import locked, new_file, write_json
 from evplace.workers import run_all
@@ -46,9 +47,9 @@ class Choice:
     def __post_init__(self) -> None:
         if self.seeds < 1:
             raise SettingsError(f"{self.seeds} seeds make no table: take at least 1")
-        for name in self.inputs:
-            if name not in inputs():
-                raise SettingsError(f"unknown input '{name}': known are {', '.join(inputs())}")
+        for key in ("seed", "augment"):
+            if key in self.train:
+                raise SettingsError(f"'{key}' cannot be set for all trainings: the recipes need their own")
 
 
 class Table(NamedTuple):
@@ -77,12 +78,17 @@ def reproduce(
     """
     folder, chosen = Path(out), choice or Choice()
     family = plugs.load("reproduction", name)
-    count = workers or os.cpu_count() or 1
+    count = (os.cpu_count() or 1) if workers is None else workers
+    _check(name, family, chosen, count)
+    drives = _real_sets(data) if family.NEEDS == "data" else Cities(Path(city or folder / "city"), folder)
+    cases = family.cases(drives, chosen)
     began = time.monotonic()
-    with locked(folder / name):
-        drives = _real_sets(data) if family.NEEDS == "data" else _cities(folder, city, count)
-        runs = Runs(folder, drives.settings)
-        cases = family.cases(drives, chosen)
+    with locked(folder / "reproduce"):
+        if city is None and isinstance(drives, Cities):
+            generate(drives.city, workers=count, progress=_of_city(progress))
+        runs = Runs(folder, drives.source)
+        drives.check(cases)
+        cases = runs.distinct(cases)
         _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, count, progress)
         document: dict[str, Any] = family.collect(drives, runs, chosen)
         document |= {
@@ -96,11 +102,21 @@ def reproduce(
     return document
 
 
-def _cities(folder: Path, city: str | Path | None, workers: int) -> Cities:
-    """The given city, or the benchmark, made where it is not there yet."""
-    if city is None:
-        generate(folder / "city", workers=workers)
-    return Cities(Path(city) if city is not None else folder / "city", folder)
+def _check(name: str, family: ModuleType, choice: Choice, workers: int) -> None:
+    """SettingsError for a choice that this table cannot make."""
+    if workers < 1:
+        raise SettingsError(f"{workers} processes can do nothing: take at least 1")
+    for one in choice.inputs:
+        if one not in family.INPUTS:
+            known = ", ".join(family.INPUTS) or "none: it is made of all that it needs"
+            raise SettingsError(f"'{one}' is no input that {name} can be limited to: known are {known}")
+
+
+def _of_city(progress: Progress | None) -> Callable[[CityProgress], None] | None:
+    """The city's own progress, told as ours: in thousandths."""
+    if progress is None:
+        return None
+    return lambda at: progress(round(at.share * 1000), 1000, f"driving {at.drive}")
 
 
 def _real_sets(data: str | Path | None) -> RealSets:
@@ -108,7 +124,7 @@ def _real_sets(data: str | Path | None) -> RealSets:
     if data is None:
         raise InputError("real sets are not made but read: give the folder that holds them with --data")
     found = RealSets(Path(data))
-    if not found.settings:
+    if not found.present:
         raise InputError(f"{data} holds none of the real sets that there are recipes for")
     return found
 
@@ -122,7 +138,7 @@ def _answer(
     drives.prepare(cases, workers)
     groups: dict[str, list[Case]] = {}
     for case in cases:
-        groups.setdefault(case.map_key(runs.source), []).append(case)
+        groups.setdefault(runs.map_key(case), []).append(case)
     # What is trained comes first: the longest work last would leave a core idle. Each process gets its share
     # at once, for starting one takes seconds.
     ordered = sorted(groups.values(), key=lambda group: group[0].train is None)
@@ -131,7 +147,6 @@ def _answer(
     jobs = [
         {
             "kind": type(drives).__name__, "drives": drives.to_dict(), "out": str(runs.out),
-            "threads": max(1, (os.cpu_count() or 1) // count),
             "groups": [[case.to_dict() for case in group] for group in share],
         }
         for share in shares

@@ -83,7 +83,7 @@ class Case:
     swept: bool = False
     """Whether the curve over the matcher's parameter is wanted, not its answers."""
     keep: str = ""
-    """Name under which the whole result is kept; "" for none. Not part of the key."""
+    """Name under which the whole result is kept; "" for none."""
 
     @classmethod
     def of(cls, database: str, query: str, seen: Input, method: Method, train: Values | None = None) -> Case:
@@ -129,7 +129,7 @@ class Case:
 
     def key(self, source: Values) -> str:
         """What two runs of the same case have in common: a checksum of its settings and of the drives'."""
-        return _checksum({**replace(self, keep="").to_dict(), "city": source})
+        return checksum({**replace(self, keep="").to_dict(), "city": source})
 
     def map_key(self, source: Values) -> str:
         """The same of its map alone: a network does not depend on the query, nor on who reads it."""
@@ -137,9 +137,10 @@ class Case:
         beside = {"query", "matcher", "matcher_settings", "swept", "keep"}
         if self.train is not None:
             beside |= {"scorer", "scorer_settings"}
-        return _checksum({name: value for name, value in of_map.items() if name not in beside})
+        return checksum({name: value for name, value in of_map.items() if name not in beside})
 
 
-def _checksum(values: Values) -> str:
+def checksum(values: Values) -> str:
+    """A name for these values and this version."""
     text = json.dumps({**values, "evplace": evplace.__version__}, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:20]

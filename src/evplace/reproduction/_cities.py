@@ -17,7 +17,7 @@ from evplace.images import Imager, ImageSettings
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid
 from evplace.readers import open_recording
-from evplace.reproduction._cases import Case
+from evplace.reproduction._cases import Case, checksum
 from evplace.settings import make, to_dict
 from evplace.storage import new_folder, read_json
 from evplace.tones import toned
@@ -58,12 +58,7 @@ class Cities:
 
     def opened(self, drive: str, case: Case) -> Traverse:
         """A drive as a case sees it."""
-        folder = self._folder(drive, case)
-        if not folder.is_dir():
-            raise InputError(
-                f"{self.city} lacks {drive}/{case.part}: make it with evplace city -o {self.city}"
-            )
-        found = Traverse.load(folder)[:: case.every]
+        found = Traverse.load(self._folder(drive, case))[:: case.every]
         if case.tone == "plain":
             return found
         return dataclasses.replace(found, images=toned(np.asarray(found.images), case.tone))
@@ -77,23 +72,33 @@ class Cities:
         """Rule -> what is right: by places, the paper's, and by view."""
         return {rule: truth_of(place_map, query, rule) for rule in RULES}
 
+    def source(self, _: Case) -> dict[str, Any]:
+        """How the drives of a case were made."""
+        return self.settings
+
+    def check(self, cases: list[Case]) -> None:
+        """InputError where the city lacks a drive or a sensor that some case needs and that is not made."""
+        assert self.settings  # or there is no city at all
+        for case in cases:
+            for drive in (case.database, case.query):
+                if case.exposure == "fixed" and not (self.city / drive / case.part).is_dir():
+                    raise InputError(
+                        f"{self.city} lacks {drive}/{case.part}: make a city with all drives and sensors in "
+                        "a new folder: evplace city -o FOLDER"
+                    )
+
     def prepare(self, cases: list[Case], workers: int) -> None:
-        """Make the drives that the benchmark does not have and some case needs."""
+        """Make the drives and images that the benchmark does not have and some case needs."""
         if any(case.exposure == "auto" for case in cases):
             exposed = self._like(sensors=(), most_gain=EXPOSED_GAIN, keep_events=False)
             # Colour images need no frames between them: the camera's gain follows within a second anyhow.
             exposed = dataclasses.replace(exposed, fps=exposed.image_hz)
-            wanted = {
-                drive for case in cases if case.exposure == "auto" for drive in (case.database, case.query)
-            }
-            generate(self._exposed, exposed, workers, drives=sorted(map(_pair, wanted)))
+            wanted = _drives([case for case in cases if case.exposure == "auto"])
+            generate(self._exposed, exposed, workers, drives=wanted)
         again = [case for case in cases if case.windows is not None or case.images is not None]
-        if not again:
-            return
-        wanted = {drive for case in again for drive in (case.database, case.query)}
-        if not all(self._recording(drive, case.part).exists() for case in again for drive in wanted):
+        if again and not self.settings["keep_events"]:
             kept = self._like(sensors=tuple(sorted({case.part for case in again})), keep_events=True)
-            generate(self._kept, kept, workers, drives=sorted(map(_pair, wanted)))
+            generate(self._kept, kept, workers, drives=_drives(again))
         for case in again:
             for drive in (case.database, case.query):
                 self._remake(drive, case)
@@ -113,12 +118,13 @@ class Cities:
 
     def _folder(self, drive: str, case: Case) -> Path:
         if case.windows is not None or case.images is not None:
-            return self.beside / "remade" / f"{drive} {case.part} {_name(case)}"
+            made_from = checksum({"city": self.settings, "windows": case.windows, "images": case.images})
+            return self.beside / "remade" / f"{drive} {case.part} {made_from}"
         return (self._exposed if case.exposure == "auto" else self.city) / drive / case.part
 
     def _recording(self, drive: str, part: str) -> Path:
-        here = self.city / drive / f"{part}.aedat4"
-        return here if here.exists() else self._kept / drive / f"{part}.aedat4"
+        city = self.city if self.settings["keep_events"] else self._kept
+        return city / drive / f"{part}.aedat4"
 
     def _remake(self, drive: str, case: Case) -> None:
         """The images of a drive made anew from its events, at the same times."""
@@ -153,12 +159,7 @@ def _windows(events: Events, given: Traverse, windows: WindowSettings) -> Iterat
         yield events[start:end]
 
 
-def _name(case: Case) -> str:
-    """The settings of images and windows as a folder's name."""
-    told = {**(case.windows or {}), **(case.images or {})}
-    return " ".join(f"{key}={value}".replace("/", "_") for key, value in sorted(told.items())) or "as it was"
-
-
-def _pair(drive: str) -> tuple[str, int]:
-    condition, _, path = drive.rpartition("-")
-    return condition, int(path)
+def _drives(cases: list[Case]) -> list[tuple[str, int]]:
+    """(condition, path) of every drive of `cases`."""
+    names = sorted({drive for case in cases for drive in (case.database, case.query)})
+    return [(condition, int(path)) for condition, _, path in (name.rpartition("-") for name in names)]

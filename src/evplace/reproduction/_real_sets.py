@@ -36,7 +36,7 @@ class RealSet:
     dataset: str = ""
     """The data set's name, where it is a folder of drives."""
     folder: str = ""
-    """Where it lies, below the folder of data."""
+    """Where it lies, below the folder of data; it holds a list of images NAME.csv for each drive."""
     arrays: str = ""
     """Or an .npz file below it with an array of images for each drive."""
     tolerances: tuple[int, ...] = ()
@@ -69,15 +69,24 @@ class RealSets:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The recipes of the sets: other sets, other runs. InputError where there is no folder of data."""
-        if not self.data.is_dir():
-            raise InputError(f"there is no folder of data {self.data}: give one with --data")
+        """The recipes of the sets that are there."""
         return {one.title: to_dict(one) for one in self.present}
 
     @property
     def present(self) -> list[RealSet]:
-        """The sets that are there."""
-        return [one for one in recipes("real", RealSet) if (self.data / (one.arrays or one.folder)).exists()]
+        """The sets whose drives and truth are all there; InputError where there is no folder of data."""
+        if not self.data.is_dir():
+            raise InputError(f"there is no folder of data {self.data}: give one with --data")
+        return [one for one in recipes("real", RealSet) if all(file.exists() for file in self._files(one))]
+
+    def source(self, case: Case) -> dict[str, Any]:
+        """The recipe of a case's set, and the size and time of its files: other files, other runs."""
+        real = self._set(case.query.partition(": ")[0])
+        files = [file.stat() for file in self._files(real)]
+        return to_dict(real) | {"files": [[file.st_size, file.st_mtime_ns] for file in files]}
+
+    def check(self, cases: list[Case]) -> None:
+        """Nothing: only sets that are there have cases."""
 
     def opened(self, drive: str, case: Case) -> Traverse:
         """A drive of the set that a case is about, which it names `TITLE: DRIVE`."""
@@ -110,6 +119,13 @@ class RealSets:
 
     def prepare(self, cases: list[Case], workers: int) -> None:
         """Nothing: what is not there is not made."""
+
+    def _files(self, real: RealSet) -> list[Path]:
+        """What must be there."""
+        drives = [f"{real.folder}/{drive}.csv" for drive in (real.reference, real.query)]
+        return [
+            self.data / name for name in ([real.arrays] if real.arrays else drives) + [real.truth] if name
+        ]
 
     def _set(self, title: str) -> RealSet:
         return next(one for one in recipes("real", RealSet) if one.title == title)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,34 @@ class Runs:
 
     out: Path
     """The folder."""
-    source: dict[str, Any]
-    """How the drives were made: other drives, other runs."""
+    source: Callable[[Case], dict[str, Any]]
+    """How the drives of a case were made: other drives, other runs."""
+
+    def key(self, case: Case) -> str:
+        """What two runs of the same case have in common."""
+        return case.key(self.source(case))
+
+    def map_key(self, case: Case) -> str:
+        """What two cases of the same map have in common."""
+        return case.map_key(self.source(case))
+
+    def distinct(self, cases: list[Case]) -> list[Case]:
+        """Each case once; of equal ones that whose result is kept."""
+        found: dict[str, Case] = {}
+        for case in cases:
+            key = self.key(case)
+            if key not in found or case.keep:
+                found[key] = case
+        return list(found.values())
 
     def done(self, case: Case) -> bool:
         """Whether a case has been answered, and its result is there where it is to be kept."""
-        return self._file(case).exists() and (not case.keep or self.result_folder(case).is_dir())
+        if not self._file(case).exists():
+            return False
+        kept = self.result_folder(case) / "result.json"
+        return not case.keep or (
+            kept.exists() and read_json(kept, "a result")["settings"].get("key") == self.key(case)
+        )
 
     def found(self, case: Case) -> dict[str, Any]:
         """What came out of a case that is done."""
@@ -33,18 +56,18 @@ class Runs:
             write_json(partial, {"case": case.to_dict(), **outcome})
 
     def cpu_s(self, cases: list[Case]) -> float:
-        """Processor seconds that `cases` took when they were run, with the trainings that they share."""
-        maps = {self.map_file(case) for case in cases if case.train is not None}
-        trained = (read_json(file / "map.json", "a map")["settings"]["train_cpu_s"] for file in maps)
-        return float(sum(trained) + sum(self.found(case)["cpu_s"] for case in cases))
+        """Processor seconds of the trainings and answers of `cases`, when they were run."""
+        outcomes = {self.key(case): (self.map_key(case), self.found(case)) for case in cases}
+        trained = {map_key: outcome["train_cpu_s"] for map_key, outcome in outcomes.values()}
+        return float(sum(trained.values()) + sum(outcome["cpu_s"] for _, outcome in outcomes.values()))
 
     def map_file(self, case: Case) -> Path:
         """Where the map of a case is kept."""
-        return self.out / "maps" / f"{case.map_key(self.source)}.evp"
+        return self.out / "maps" / f"{self.map_key(case)}.evp"
 
     def result_folder(self, case: Case) -> Path:
         """Where the whole result of a case is kept."""
         return self.out / "results" / case.keep
 
     def _file(self, case: Case) -> Path:
-        return self.out / "runs" / f"{case.key(self.source)}.json"
+        return self.out / "runs" / f"{self.key(case)}.json"

@@ -1,4 +1,4 @@
-"""Many cases in a process of its own: `python -m evplace.reproduction._worker JOB`."""
+"""Many cases in a process of its own: see `evplace.workers`."""
 
 from __future__ import annotations
 
@@ -34,9 +34,8 @@ KINDS: dict[str, type[Cities] | type[RealSets]] = {kind.__name__: kind for kind 
 
 def work(job: dict[str, Any], say: Callable[[str], None]) -> None:
     """Answer the cases of all groups of `job`, each of which shares a map; says what was done, one by one."""
-    _limit_threads(job["threads"])
     drives = KINDS[job["kind"]].from_dict(job["drives"])
-    runs = Runs(Path(job["out"]), drives.settings)
+    runs = Runs(Path(job["out"]), drives.source)
     for group in job["groups"]:
         _answer_group([Case.from_dict(values) for values in group], drives, runs, say)
 
@@ -56,13 +55,13 @@ def _answer_group(cases: list[Case], drives: Drives, runs: Runs, say: Callable[[
             say(f"{case.query} {case.part} {case.scorer} {case.matcher}")
 
 
-def _limit_threads(threads: int) -> None:
-    """As many threads as there are cores for this process: more would only get in each other's way."""
+def _use_one_thread() -> None:
+    """As many trainings run as there are cores; and the number of threads would change the last bits."""
     try:
         import torch
     except ModuleNotFoundError as error:
         raise MissingExtraError("torch", "train", "training the network") from error
-    torch.set_num_threads(threads)
+    torch.set_num_threads(1)
 
 
 def _learned(case: Case, day: Traverse, drives: Drives, runs: Runs) -> PlaceMap:
@@ -72,6 +71,7 @@ def _learned(case: Case, day: Traverse, drives: Drives, runs: Runs) -> PlaceMap:
         return train(day, places, case.scorer, scorer_settings=case.scorer_settings)
     file = runs.map_file(case)
     if not file.exists():
+        _use_one_thread()
         settings = make(TrainSettings, case.train)
         began = time.process_time()
         place_map = train(day, places, settings=settings, checkpoint=file.with_suffix(".checkpoint"))
@@ -95,17 +95,21 @@ def _answer(
     path, rows = where.path(query, rows)
     found: dict[str, Any] = {}
     for rule, truth in drives.truths(place_map, query, case).items():
-        settings = {"case": case.to_dict(), "map": place_map.settings, "matcher": where.settings}
+        settings = {"key": runs.key(case), "map": place_map.settings, "matcher": where.settings}
         positions, xy = place_map.items.position, xy_in(place_map, query)
         result = measure(path, truth, rows, positions, query.t_us, settings, xy)
         found[rule] = {"figures": result.figures}
         if case.swept:
-            found[rule]["curve"] = _curve(case, rows, query, result, truth.accepts).tolist()
-        if case.keep and not found.keys() - {rule}:
+            found[rule]["curve"] = _curve(
+                case, rows, query, result, truth.accepts, where.scorer.distances
+            ).tolist()
+        if case.keep and len(found) == 1:  # the first rule is the paper's
             show = item_images(place_map, query, day)
             assert show is not None  # the map's drive lends its images
             sample(result, query.images, show).save(runs.result_folder(case), overwrite=True)
-    runs.keep(case, {"rules": found, "cpu_s": round(time.process_time() - began, 2)})
+    taken = {"cpu_s": round(time.process_time() - began, 2)}
+    taken["train_cpu_s"] = place_map.settings.get("train_cpu_s", 0.0)
+    runs.keep(case, {"rules": found, **taken})
     return rows
 
 
@@ -115,6 +119,7 @@ def _curve(
     query: Traverse,
     result: Result,
     accepts: Callable[[NDArray[np.int64]], NDArray[np.bool_]],
+    distances: bool,
 ) -> NDArray[np.float64]:
     """(values, 3) the swept parameter's value, recall (of the seen) and precision, in the order of recall."""
     filled = np.flatnonzero(query.counts != 0)
@@ -122,9 +127,7 @@ def _curve(
     others = {name: value for name, value in case.matcher_settings.items() if name != parameter}
     values = _every_level(rows[filled]) if case.matcher == "local" else None
     points = []
-    for value, path in sweep(
-        case.matcher, rows[filled], values, parameter, distances=case.scorer in ("sad", "seqslam"), **others
-    ):
+    for value, path in sweep(case.matcher, rows[filled], values, parameter, distances=distances, **others):
         item = np.full(len(query), -1, np.int64)
         item[filled] = np.where(path.accepted, path.item, -1)
         accepted, right = (item >= 0)[result.judged], accepts(item)[result.judged]

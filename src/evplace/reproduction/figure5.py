@@ -2,7 +2,8 @@
 
 Swept are tau1, mu and m, as in the paper (5.2), at every value that changes an answer. Recall is of the
 queries whose place the map has. tau1 touches only queries that fail the local test, so its curve need not
-reach a recall of zero. Average precision is the sum of precision times the gain in recall.
+reach a recall of zero: where it begins is told. Average precision is the sum of precision times the gain in
+recall, from zero on; a curve that begins later is given its first precision up to there.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from evplace.sweeps import SWEPT
 
 TITLE = "Figure 5: precision against recall"
 NEEDS = "city"
+INPUTS = ("events", "events, from 8 bit", "colour")
 FORMAT = "evplace-curves-1"
 
 
@@ -79,16 +81,18 @@ def collect(_: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
 
 
 def tables(document: dict[str, Any]) -> Iterator[Table]:
-    """Average precision, and where each curve ends, for each panel."""
+    """For each panel average precision over the seeds, and where the first seed's curve begins and ends."""
     for panel in dict.fromkeys(curve["panel"] for curve in document["curves"]):
         lines = []
         for curve in (curve for curve in document["curves"] if curve["panel"] == panel):
             spread = f" ± {curve['spread']:.3f}" if curve["spread"] is not None else ""
-            end = "{1:.2f}, {2:.2f}".format(*curve["points"][-1]) if curve["points"] else "-"
+            ends = [f"{point[1]:.2f}, {point[2]:.2f}" for point in (curve["points"] or [[0, 0, 0]])]
             average = f"{curve['average_precision']:.3f}{spread}"
             points = str(len(curve["points"]))
-            lines.append([curve["input"], curve["matcher"], curve["parameter"], average, end, points])
-        columns = ["input", "method", "swept", "average precision", "ends at recall, precision", "points"]
+            lines.append(
+                [curve["input"], curve["matcher"], curve["parameter"], average, ends[0], ends[-1], points]
+            )
+        columns = ["input", "method", "swept", "average precision", "from recall, precision", "to", "points"]
         yield Table(f"Precision against recall, {panel}", columns, lines)
 
 

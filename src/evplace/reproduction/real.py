@@ -18,6 +18,7 @@ from evplace.reproduction._runs import Runs
 
 TITLE = "Real drives: accuracy in %"
 NEEDS = "data"
+INPUTS: tuple[str, ...] = ()
 FORMAT = "evplace-table-1"
 
 

@@ -18,6 +18,7 @@ from evplace.reproduction._runs import Runs
 
 TITLE = "Table 2: accuracy in %, the map is the day's drive on path 1"
 NEEDS = "city"
+INPUTS = tuple(inputs())
 FORMAT = "evplace-table-1"
 KEPT_INPUTS = ("events", "events, from 8 bit", "colour")
 KEPT_METHODS = (
@@ -64,15 +65,16 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
     """The table for people: by both rules, on the seen alone, what is rejected, and colour's fair chance."""
     rows = document["rows"]
     main = [row for row in rows if row["input"] in MAIN_INPUTS]
+    fair = [row for row in rows if row["input"] not in MAIN_INPUTS or row["input"] == "colour"]
     for rule, told in RULES.items():
-        yield _table(f"Accuracy in %, {told}", [row for row in main if row["rule"] == rule], "mean")
+        yield from _table(f"Accuracy in %, {told}", [row for row in main if row["rule"] == rule], "mean")
     by_places = [row for row in main if row["rule"] == "places"]
-    yield _table("Accuracy in % on queries of places that the map has", by_places, "seen")
-    yield _table("Rejected queries in %", by_places, "rejected")
-    others = [row for row in rows if row["input"] not in MAIN_INPUTS or row["input"] == "colour"]
-    fair = [row for row in others if row["rule"] == "places"]
-    if len({row["input"] for row in fair}) > 1:
-        yield _table("Colour's fair chance: accuracy in %, the paper's rule", fair, "mean")
+    yield from _table("Accuracy in % on queries of places that the map has", by_places, "seen")
+    yield from _table("Rejected queries in %", by_places, "rejected")
+    if any(row["input"] != "colour" for row in fair):
+        for rule, told in RULES.items():
+            of_rule = [row for row in fair if row["rule"] == rule]
+            yield from _table(f"Colour's fair chance: accuracy in %, {told}", of_rule, "mean")
 
 
 def _cells(choice: Choice) -> Iterator[tuple[Recipe, str, str, list[Case]]]:
@@ -81,28 +83,36 @@ def _cells(choice: Choice) -> Iterator[tuple[Recipe, str, str, list[Case]]]:
         for name in choice.inputs or inputs():
             for method, how in methods().items():
                 first = Case.of(recipe.database, recipe.query, inputs()[name], how, choice.train)
+                if inputs()[name].train and first.train is None:
+                    continue  # another training is no other input to what is not trained
                 group = first.with_seeds(choice.seeds)
                 if name in KEPT_INPUTS and method in KEPT_METHODS:
                     group[0] = replace(group[0], keep=f"{recipe.query}, {name}, {method}")
                 yield recipe, name, method, group
 
 
-def _table(title: str, rows: list[dict[str, Any]], figure: str) -> Table:
+def _table(title: str, rows: list[dict[str, Any]], figure: str) -> Iterator[Table]:
+    """One table of a figure; none without rows."""
+    if not rows:
+        return
     names = list(dict.fromkeys(row["input"] for row in rows))
+    matchers = list(dict.fromkeys(row["matcher"] for row in rows))
     cells = {(row["query"], row["matcher"], row["input"]): row for row in rows}
     lines = []
     for query in dict.fromkeys(row["query"] for row in rows):
-        chance = next(row["chance"] for row in rows if row["query"] == query)
         if figure == "mean":
-            lines.append([query, "chance", *[f"{chance:.1f}"] * len(names), ""])
-        for matcher in dict.fromkeys(row["matcher"] for row in rows):
-            line = [cells[query, matcher, name] for name in names]
-            paper = _paper(line) if figure == "mean" else ""
-            lines.append([query, matcher, *[shown(cell, figure) for cell in line], paper])
+            chances = [cells[query, matchers[0], name]["chance"] for name in names]
+            lines.append([query, "chance", *(f"{chance:.1f}" for chance in chances), ""])
+        for matcher in matchers:
+            line = [cells.get((query, matcher, name)) for name in names]
+            paper = _paper([cell for cell in line if cell is not None]) if figure == "mean" else ""
+            lines.append(
+                [query, matcher, *("-" if cell is None else shown(cell, figure) for cell in line), paper]
+            )
     columns = ["query", "method", *names, "paper"]
     if not any(line[-1] for line in lines):  # only the first table has the paper's numbers
         columns, lines = columns[:-1], [line[:-1] for line in lines]
-    return Table(title, columns, lines)
+    yield Table(title, columns, lines)
 
 
 def _paper(line: list[dict[str, Any]]) -> str:
