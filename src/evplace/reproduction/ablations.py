@@ -1,7 +1,7 @@
 """What the paper leaves open, or its author did otherwise: one change at a time.
 
 Compared with is the paper's training and matching as printed, on the city's images of 1/30 s. The effect is
-the mean over the seeds of the accuracy's change with the same seed, in points. It is called an effect where it
+the mean over the seeds of the change in accuracy with the same seed, in points. It is called so where it
 is larger than the seed-to-seed spread of both accuracies; with one seed nothing is called so.
 """
 
