@@ -76,7 +76,7 @@ def test_the_papers_numbers_stand_beside_ours(table: dict[str, Any]) -> None:
     }
     assert told["night-1", "global-max"] == 85.80
     assert told["rain-2", "graph, alpha 0.1"] == 37.91
-    assert len(told) == 20
+    assert len(told) == 25
     assert all(row["paper"] is None for row in table["rows"] if row["rule"] == "view")
 
 
