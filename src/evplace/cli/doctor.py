@@ -21,8 +21,7 @@ from typing import Literal
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, print_json
-from evplace.doctor import STATES, Examination, Finding, as_json, draw, examine
-from evplace.errors import OutputError
+from evplace.doctor import STATES, Examination, Finding, as_json, check_drawing, draw, examine
 
 WIDTH = 110
 """Columns of the text."""
@@ -56,8 +55,8 @@ class Args:
 
 def run(args: Args) -> int:
     """Examine, print, and draw if asked."""
-    if args.report is not None and args.report.exists() and not args.overwrite:
-        raise OutputError(f"{args.report} exists: choose another name, remove it, or add --overwrite")
+    if args.report is not None:
+        check_drawing(args.report, args.overwrite)
     found = examine(args.recording, args.track, args.dt, args.size, args.time_unit, args.fps)
     if args.report is not None:
         draw(found, args.report, args.overwrite)

@@ -21,10 +21,12 @@ from evplace import settings
 from evplace.capture import open_traverse
 from evplace.charts import curve_chart
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
-from evplace.errors import MissingExtraError, OutputError
+from evplace.errors import MissingExtraError
+from evplace.evaluation import MARK
 from evplace.images import ImageSettings
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
+from evplace.storage import check_new_folder
 from evplace.traverse import Traverse
 from evplace.trial import evaluate
 from evplace.truth import Truth, by_frames, by_matrix
@@ -79,8 +81,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Localise the drive, measure, save and print."""
-    if args.out.exists() and not args.overwrite:
-        raise OutputError(f"{args.out} exists: choose another name, remove it, or add --overwrite")
+    check_new_folder(args.out, args.overwrite, MARK)
     place_map = PlaceMap.load(args.map)
     values = settings.from_pairs(args.set)
     where = Localizer(place_map, args.matcher, args.preset, args.mask, **values)

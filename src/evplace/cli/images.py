@@ -27,6 +27,7 @@ from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts,
 from evplace.images import ImageSettings
 from evplace.sheets import contact_sheet
 from evplace.spacing import SpacingSettings
+from evplace.storage import check_new_file
 from evplace.traverse import Traverse, TraverseWriter, new_traverse
 from evplace.windows import WindowSettings
 
@@ -77,6 +78,8 @@ class Args:
 
 def run(args: Args) -> int:
     """Write the traverse, and the sheet if asked."""
+    if args.sheet is not None:
+        check_new_file(args.sheet, args.overwrite)
     with new_traverse(args.out, {}, args.overwrite) as writer:
         fault = _record(args, writer)
     traverse = Traverse.load(args.out)

@@ -23,11 +23,13 @@ from evplace import settings as settings_room
 from evplace.capture import open_traverse
 from evplace.cleaning import CleaningSettings
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
-from evplace.errors import OutputError, TraverseError
+from evplace.errors import TraverseError
 from evplace.images import ImageSettings
+from evplace.placemap import MARK
 from evplace.places import PlaceGrid, PlaceRuns, Places
 from evplace.scorers import checked_settings
 from evplace.spacing import SpacingSettings
+from evplace.storage import check_new_folder
 from evplace.training import PRESETS, TrainSettings, train
 from evplace.traverse import Traverse
 from evplace.windows import WindowSettings
@@ -76,8 +78,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Learn and save the map."""
-    if args.out.exists() and not args.overwrite:  # said before the training, not after it
-        raise OutputError(f"{args.out} exists: choose another name, remove it, or add --overwrite")
+    check_new_folder(args.out, args.overwrite, MARK)  # said before the training, not after it
     scorer_settings = checked_settings(args.scorer, settings_room.from_pairs(args.set))
     day = open_traverse(
         args.drive, args.track, args.windows, args.images, args.size, args.time_unit,

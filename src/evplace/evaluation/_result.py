@@ -16,6 +16,8 @@ from evplace.evaluation._measures import CURVE, Bools, Floats
 from evplace.evaluation._samples import Samples
 from evplace.matchers import Path as Answers
 
+MARK = "pr_curve.npy"
+"""What tells a folder that was written here from any other: only such a one is replaced."""
 _MATCHES = ("query", "t_us", "item", "score", "accepted", "judged", "seen", "right", "true_item")
 
 OUTCOMES = ("right", "wrong", "missed", "unseen")
@@ -79,7 +81,7 @@ class Result:
 
         `with_scores` adds scores.npy. Raises OutputError where the folder cannot be written.
         """
-        with storage.new_folder(path, overwrite) as folder:
+        with storage.new_folder(path, overwrite, MARK) as folder:
             storage.write_json(folder / "result.json", self._summary())
             _write_matches(folder / "matches.csv", self)
             arrays = {
@@ -100,7 +102,7 @@ class Result:
         try:
             what = f"the result in {folder}"
             summary = storage.read_json(folder / "result.json", what)
-            curve = storage.read_array(folder / "pr_curve.npy", what).reshape(-1, len(CURVE))
+            curve = storage.read_array(folder / MARK, what).reshape(-1, len(CURVE))
             answers, columns = _read_matches(folder / "matches.csv")
             images = _kept(folder / "samples.npy")
             samples = Samples.of(summary["samples"], images) if images is not None else None
