@@ -88,6 +88,22 @@ def test_settings_files(folder: Path, capsys: Capture) -> None:
     assert "known are" in fault(capsys, *start)
 
 
+def test_settings_files_of_the_wrong_kind(folder: Path, capsys: Capture) -> None:
+    toml = folder / "s.toml"
+    start = ("images", folder / "day.aedat4", "-o", folder / "x", "--settings", toml)
+    toml.write_text("images = 3\n")
+    assert "it is a table, [images]" in fault(capsys, *start)
+    toml.write_text("[images]\nblur = 3\n")
+    assert "true or false" in fault(capsys, *start)
+    toml.write_text("[images]\ntau_ms = nan\n")
+    assert "'tau_ms' cannot be nan" in fault(capsys, *start)
+    assert "'tau_ms' cannot be nan" in fault(capsys, *start[:4], "--tau-ms", "nan")
+    assert "cannot be nan" in fault(
+        capsys, "train", folder / "day.aedat4", "--track", folder / "day.csv", "-o", folder / "m",
+        "--cell-m", "nan",
+    )  # fmt: skip
+
+
 def test_files_that_are_no_recordings(folder: Path, capsys: Capture) -> None:
     (folder / "empty.aedat4").write_bytes(b"")
     (folder / "text.aedat4").write_text("good day\n")
@@ -166,6 +182,18 @@ def test_tracks(folder: Path, capsys: Capture) -> None:
     (folder / "nofix.nmea").write_text("$GPRMC,134730.361,V,,,,,,,041112,,,N*4C\n")
     assert "nofix.nmea" in fault(capsys, *start, "--track", folder / "nofix.nmea")
     assert not (folder / "m").exists()
+    for shift in ("-1000000", "1000000"):
+        told = fault(
+            capsys, "images", folder / "day.aedat4", "-o", folder / "x", "--track", folder / "day.csv",
+            "--track-offset", shift, "--every-m", "2",
+        )  # fmt: skip
+        assert "do not overlap" in told
+    assert "--track-preset" in fault(
+        capsys, "images", folder / "day.aedat4", "-o", folder / "x", "--track-offset", "1"
+    )
+    assert "cannot be shifted" in fault(
+        capsys, *start, "--track", folder / "day.csv", "--track-offset", "inf"
+    )
 
 
 def test_one_place_only_is_a_map(folder: Path, capsys: Capture) -> None:

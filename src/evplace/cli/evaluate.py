@@ -21,6 +21,7 @@ from evplace import settings
 from evplace.capture import open_traverse
 from evplace.charts import curve_chart
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
+from evplace.cli._track import TrackFlags
 from evplace.errors import MissingExtraError
 from evplace.evaluation import MARK
 from evplace.images import ImageSettings
@@ -40,7 +41,7 @@ SHOWN = (
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(TrackFlags):
     """Flags of `evplace evaluate`."""
 
     map: tyro.conf.Positional[Path]
@@ -49,8 +50,6 @@ class Args:
     """The query drive: an event recording, a folder of images, or a traverse folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The result folder to write."""
-    track: Path | None = None
-    """GPS log of the query drive: NMEA, GPX or csv."""
     truth: Path | None = None
     """A .npy matrix of 0 and 1, rows = queries, columns = map items, in place of positions."""
     frames: int | None = None
@@ -107,7 +106,7 @@ def _opened(args: Args, where: Localizer) -> Traverse:
     windows = settings.make(WindowSettings, where.map.settings.get("windows") or {})
     images = settings.make(ImageSettings, where.map.settings.get("images") or {})
     return open_traverse(
-        args.drive, args.track, windows, images, args.size, args.time_unit, where.cleaning,
+        args.drive, args.opened_track(), windows, images, args.size, args.time_unit, where.cleaning,
         mask=where.mask, kind=where.map.settings.get("input"),
     )  # fmt: skip
 
