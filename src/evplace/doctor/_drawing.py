@@ -13,7 +13,7 @@ from evplace.doctor._outcome import Curve, Examination, Map
 from evplace.errors import MissingExtraError
 from evplace.storage import check_new_folder, new_folder, write_json
 
-MARK = "findings.json"
+FINDINGS = "findings.json"
 """What tells a folder that was written here from any other: only such a one is replaced."""
 INK, SHADE, MARK = "#1b6ca8", "#efb998", "#c4622d"
 
@@ -22,7 +22,7 @@ def check_drawing(folder: str | Path, overwrite: bool = False) -> None:
     """Raises what `draw` would raise: for saying so before an examination, which may take minutes."""
     if importlib.util.find_spec("matplotlib") is None:
         raise MissingExtraError("matplotlib", "report", "drawing an examination")
-    check_new_folder(folder, overwrite, MARK)
+    check_new_folder(folder, overwrite, FINDINGS)
 
 
 def draw(examination: Examination, folder: str | Path, overwrite: bool = False) -> None:
@@ -33,8 +33,8 @@ def draw(examination: Examination, folder: str | Path, overwrite: bool = False) 
     check_drawing(folder, overwrite)
     from matplotlib.figure import Figure
 
-    with new_folder(folder, overwrite, MARK) as partial:
-        write_json(partial / MARK, as_json(examination))
+    with new_folder(folder, overwrite, FINDINGS) as partial:
+        write_json(partial / FINDINGS, as_json(examination))
         for drawing in examination.drawings:
             figure = Figure(figsize=(9, 4.5), layout="constrained")
             axes = figure.add_subplot(title=drawing.title)
