@@ -201,6 +201,35 @@ def test_damaged_results_are_refused(tmp_path: Path) -> None:
     assert json.loads((folder / "result.json").read_text() + "]") == []
 
 
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("figures", "average_precision"), None),
+        (("figures", "accuracy"), "much"),
+        (("figures", "accuracy"), float("nan")),
+        (("figures", "items"), 1.5),
+        (("figures",), [1]),
+        (("settings",), [1]),
+        (("versions",), 3),
+        (("took_s",), "long"),
+    ],
+)
+def test_a_summary_of_other_things_is_damaged(tmp_path: Path, place: tuple[str, ...], value: object) -> None:
+    folder = tmp_path / "r"
+    measure(answers([0] * 6), SIX).save(folder)
+    summary = json.loads((folder / "result.json").read_text())
+    inner = summary
+    for name in place[:-1]:
+        inner = inner[name]
+    if value is None:
+        del inner[place[-1]]
+    else:
+        inner[place[-1]] = value
+    (folder / "result.json").write_text(json.dumps(summary))
+    with pytest.raises(EvaluationError, match="damaged"):
+        Result.load(folder)
+
+
 def with_images() -> Result:
     """SIX with positions and samples: the image of query or item n is of the grey level n."""
     xy = [[0, 1], [3, 3], [3, 6], [0, 0], [0, 0], [np.nan, 0]]

@@ -29,7 +29,16 @@ def test_values_go_over_the_base() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"K": 1.5}, {"K": True}, {"tau": "much"}, {"kind": "c"}, {"wrap": 1}, {"name": 3}]
+    "wrong",
+    [
+        {"K": 1.5},
+        {"K": True},
+        {"tau": "much"},
+        {"kind": "c"},
+        {"wrap": 1},
+        {"name": 3},
+        {"tau": float("nan")},
+    ],
 )
 def test_a_value_of_the_wrong_type_is_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(SettingsError, match="cannot be"):

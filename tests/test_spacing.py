@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from PIL import Image
 from conftest import Drive, make_drive, write_drive
 from evplace.capture import open_traverse, record_events
 from evplace.cli import main
-from evplace.errors import SettingsError, TraverseError
+from evplace.errors import SettingsError, TrackError, TraverseError
 from evplace.events import Events
 from evplace.readers._recording import Recording
 from evplace.readers._source import Block, Source
@@ -158,3 +159,33 @@ def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     settings_of = json.loads((tmp_path / "m" / "map.json").read_text())["settings"]
     assert settings_of["spacing"]["every_m"] == 5
     assert len(np.load(tmp_path / "m" / "references.npy")) == 20
+
+
+@pytest.mark.parametrize("spacing", [SpacingSettings(), SpacingSettings(every_m=2)])
+@pytest.mark.parametrize("shift_us", [-3_600_000_000, 3_600_000_000])
+def test_a_track_of_another_time_is_told(tmp_path: Path, spacing: SpacingSettings, shift_us: int) -> None:
+    """Before the recording is read, where the track ends before it begins."""
+    track = Track.local(DRIVE.track.t_us + shift_us, DRIVE.track.xy)
+    read: list[int] = []
+
+    def blocks() -> Iterator[Block]:
+        for start in range(0, len(DRIVE.events), 1000):
+            read.append(start)
+            yield Block(*fields_of(DRIVE.events[start : start + 1000]))
+
+    recording = Recording(Path("made"), "made", Source(DRIVE.events.size, blocks), None)
+    with (
+        pytest.raises(TrackError, match="do not overlap"),
+        new_traverse(tmp_path / "x", {}) as writer,
+    ):
+        record_events(recording, writer, track=track, spacing=spacing)
+    assert (len(read) < len(DRIVE.events) / 2000) == (shift_us < 0)
+
+
+def test_a_film_and_a_track_of_another_time(tmp_path: Path) -> None:
+    for number in range(3):
+        Image.fromarray(np.zeros((12, 16), np.uint8)).save(tmp_path / f"{number}.png")
+    for shift_us in (-3_600_000_000, 3_600_000_000):
+        track = Track.local(DRIVE.track.t_us + shift_us, DRIVE.track.xy)
+        with pytest.raises(TrackError, match="do not overlap"):
+            open_traverse(tmp_path, track=track, spacing=SpacingSettings(every_m=2))

@@ -11,7 +11,16 @@ import numpy as np
 import pytest
 
 from evplace.errors import InputError, OutputError
-from evplace.storage import GrowingArray, new_file, new_folder, read_array, read_json, sha256, write_json
+from evplace.storage import (
+    GrowingArray,
+    locked,
+    new_file,
+    new_folder,
+    read_array,
+    read_json,
+    sha256,
+    write_json,
+)
 
 
 def test_a_folder_appears_at_the_end(tmp_path: Path) -> None:
@@ -28,7 +37,7 @@ def test_a_fault_leaves_what_was_there(tmp_path: Path, fault: BaseException) -> 
     (tmp_path / "out" / "old").write_text("old")
     (tmp_path / "file").write_text("old")
     wanted = OutputError if isinstance(fault, OSError) else KeyboardInterrupt
-    with pytest.raises(wanted), new_folder(tmp_path / "out", overwrite=True) as folder:
+    with pytest.raises(wanted), new_folder(tmp_path / "out", True, "old") as folder:
         (folder / "new").write_text("new")
         raise fault
     with pytest.raises(wanted), new_file(tmp_path / "file", overwrite=True) as file:
@@ -71,6 +80,32 @@ def test_what_exists_is_not_overwritten_unasked(tmp_path: Path) -> None:
         pass
     with pytest.raises(OutputError, match="exists"), new_folder(tmp_path / "x"):
         pass
+
+
+def test_only_a_folder_of_the_same_kind_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "holiday").mkdir()
+    (tmp_path / "holiday" / "beach.jpg").write_text("dear")
+    (tmp_path / "day.aedat4").write_text("dear")
+    for mark in ("", "traverse.json", "@*.jpg"):
+        with pytest.raises(OutputError, match="not replaced"), new_folder(tmp_path / "holiday", True, mark):
+            pass
+        with pytest.raises(OutputError, match="is a file"), new_folder(tmp_path / "day.aedat4", True, mark):
+            pass
+    with pytest.raises(OutputError, match="is a folder"), new_file(tmp_path / "holiday", True):
+        pass
+    assert (tmp_path / "holiday" / "beach.jpg").read_text() == "dear"
+    with new_folder(tmp_path / "holiday", True, "*.jpg"):
+        pass
+    assert list((tmp_path / "holiday").iterdir()) == []
+    with new_folder(tmp_path / "holiday", True, "traverse.json"):
+        pass
+
+
+@pytest.mark.parametrize("name", [".", "..", "/"])
+def test_a_place_is_no_name(name: str) -> None:
+    for refused in (new_file(name, True), new_folder(name, True), locked(Path(name))):
+        with pytest.raises(OutputError, match="no name of an output"), refused:
+            pass
 
 
 def test_a_second_writer_is_refused(tmp_path: Path) -> None:

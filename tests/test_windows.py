@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evplace.errors import SettingsError
+from evplace.errors import RecordingError, SettingsError
 from evplace.events import Events
 from evplace.windows import CountWindows, TimeWindows, Window, WindowSettings, open_windows
 
@@ -53,6 +53,18 @@ def test_windows_count_from_the_first_event_or_from_a_given_origin() -> None:
     late = [events_at([1_600_000_000_000_000, 1_600_000_000_000_001])]
     assert cut(TimeWindows(Fraction(1, 1000)), late) == [Window(1, 1_600_000_000_001_000, 2)]
     assert cut(TimeWindows(Fraction(1, 1000), origin_us=0), [events_at([2_500])])[-1] == Window(3, 3_000, 1)
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_a_leap_of_the_clock_is_told(together: bool) -> None:
+    t_us = [0, 40, 1_587_452_582_000_000]
+    packets = [events_at(t_us)] if together else [events_at([t]) for t in t_us]
+    with pytest.raises(RecordingError, match=r"1587452582\.000 s no event comes"):
+        cut(TimeWindows(Fraction(1, 30)), packets)
+
+
+def test_a_long_pause_is_no_leap() -> None:
+    assert len(cut(TimeWindows(Fraction(1, 10)), [events_at([0, 9_000_000_000])])) == 90_000
 
 
 times = st.lists(st.integers(0, 5_000), max_size=60).map(sorted)

@@ -146,10 +146,13 @@ def record_events(
     writer.mask = pixel_mask(recording.packets(), recording.size, cleaning, mask)
     stream = EventImages(recording.size, windows, images, cleaning, writer.mask)
     packets = _GoodPart(recording)
+    overlap = _Overlap(track)
     for image, window in images_of(packets, stream):
+        overlap.see(window.t_us)
         if spacer.keeps(window.t_us, window.events):
             writer.add(image, window.t_us, window.events)
     fault = packets.fault
+    overlap.check()
     writer.track = _aligned(track, np.array(writer.t_us, np.int64))
     writer.info |= {
         "source": str(recording.path),
@@ -179,15 +182,17 @@ def record_frames(
 ) -> None:
     """Write camera images, cropped and resized as `images` says."""
     images, spacer = images or ImageSettings(), Spacer(spacing, track)
-    shape = None
+    shape, overlap = None, _Overlap(track)
     for n, (t_us, frame) in enumerate(film.images()):
         shape = shape or frame.shape
         if frame.shape != shape:
             raise TraverseError(
                 f"{film.name(n)} is {frame.shape}, the images before it are {shape}: make them alike"
             )
+        overlap.see(t_us)
         if spacer.keeps(t_us, -1):
             writer.add(frame_image(frame, images), t_us)
+    overlap.check()
     writer.track = _aligned(track, np.array(writer.t_us, np.int64))
     writer.info |= {
         "source": str(film.path),
@@ -251,11 +256,36 @@ def _aligned(track: Track | None, t_us: NDArray[np.int64]) -> Track | None:
         return None
     aligned = track.at(t_us)
     if not aligned.known.any():
-        raise TrackError(
-            f"the track and the images do not overlap: the track runs from {_seconds(track.t_us)}, "
-            f"the images from {_seconds(t_us)}; give the recording's own track, or shift the track's times"
-        )
+        raise _apart(track, f"run from {_seconds(t_us)}")
     return aligned
+
+
+def _apart(track: Track, images: str) -> TrackError:
+    return TrackError(
+        f"the track and the images do not overlap: the track runs from {_seconds(track.t_us)}, the images "
+        f"{images}; give the recording's own track, or shift the track's times"
+    )
+
+
+class _Overlap:
+    """Tells as early as can be that no image has a position: images come in the order of their times."""
+
+    def __init__(self, track: Track | None) -> None:
+        self._track = track
+        self._seen: tuple[int, int] | None = None
+
+    def see(self, t_us: int) -> None:
+        """The time of the next image; TrackError where the first one comes after the track's end."""
+        if self._track is None:
+            return
+        if self._seen is None and t_us > self._track.t_us[-1]:
+            raise _apart(self._track, f"begin at {t_us / 1e6:.3f} s")
+        self._seen = (self._seen or (t_us, t_us))[0], t_us
+
+    def check(self) -> None:
+        """After the last image; TrackError where it came before the track's begin."""
+        if self._track is not None and self._seen is not None and self._seen[1] < self._track.t_us[0]:
+            raise _apart(self._track, f"run from {_seconds(np.array(self._seen))}")
 
 
 def _seconds(t_us: NDArray[np.int64]) -> str:

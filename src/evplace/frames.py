@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.errors import TraverseError
+from evplace.errors import SettingsError, TraverseError
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 
@@ -70,8 +70,10 @@ def open_frames(path: str | Path, listing: str | Path | None = None, fps: float 
     """The images of a folder.
 
     `listing` is a .csv or .txt with a file name in the first column of each line: only those are taken, in
-    its order. Raises TraverseError for a folder without images, or for times that do not fit.
+    its order. Raises TraverseError for a folder without images, or for times that do not fit,
+    SettingsError for an `fps` that cannot be.
     """
+    check_rate(fps)
     folder = Path(path)
     if not folder.is_dir():
         raise TraverseError(f"{folder} is no folder of images")
@@ -83,9 +85,13 @@ def open_frames(path: str | Path, listing: str | Path | None = None, fps: float 
         times = folder.parent / "timestamps.txt"
     if times.exists():
         return Frames(tuple(files), _times(times, len(files)), True)
-    if fps <= 0:
-        raise TraverseError(f"images without times need a rate above 0, not {fps} images a second")
     return Frames(tuple(files), np.floor(np.arange(len(files)) * 1_000_000 / fps).astype(np.int64), False)
+
+
+def check_rate(fps: float) -> None:
+    """SettingsError for a rate of images that none can have."""
+    if not 0 < fps <= 1e6:
+        raise SettingsError(f"the setting 'fps' cannot be {fps}: it takes over 0, up to 1e6")
 
 
 def _listed(folder: Path, listing: Path) -> list[Path]:

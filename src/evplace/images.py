@@ -63,7 +63,7 @@ class ImageSettings:
                 f"the setting 'crop_bottom' cannot be {self.crop_bottom}: it takes 0 to below 1"
             )
         for name in ("width", "height", "saturation", "tau_ms", "bins"):
-            if getattr(self, name) <= 0:
+            if not getattr(self, name) > 0:
                 raise SettingsError(
                     f"the setting '{name}' cannot be {getattr(self, name)}: it must be above 0"
                 )

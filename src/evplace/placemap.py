@@ -22,6 +22,8 @@ from evplace.storage import new_folder, read_array, read_json, sha256, write_jso
 
 FORMAT = "evplace-map-1"
 SUMS = "SHA256SUMS"
+MARK = "map.json"
+"""What tells a folder that was written here from any other: only such a one is replaced."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ class PlaceMap:
 
     def save(self, path: str | Path, overwrite: bool = False) -> None:
         """Write the folder `path`; OutputError where it exists or cannot be written."""
-        with new_folder(path, overwrite) as folder:
+        with new_folder(path, overwrite, MARK) as folder:
             if self.network is not None:
                 from safetensors.numpy import save_file
 
@@ -90,7 +92,7 @@ class PlaceMap:
                 "places": self.places.to_dict(),
                 "settings": self.settings,
             }
-            write_json(folder / "map.json", description)
+            write_json(folder / MARK, description)
             sums = [f"{sha256(file)}  {file.name}\n" for file in sorted(folder.iterdir())]
             (folder / SUMS).write_text("".join(sums), "ascii")
 
@@ -99,11 +101,11 @@ class PlaceMap:
         """The map in the folder `path`; PlaceMapError where it is none, or a byte of it has changed."""
         folder = Path(path)
         what = f"the map {folder}"
-        if not (folder / "map.json").exists():
+        if not (folder / MARK).exists():
             raise PlaceMapError(f"{folder} is no map: a map is a folder that `evplace train` has written")
         _check_sums(folder)
         try:
-            description = read_json(folder / "map.json", what)
+            description = read_json(folder / MARK, what)
             if description.get("format") != FORMAT:
                 raise PlaceMapError(f"{what} has the format {description.get('format')}, this is {FORMAT}")
             columns = read_array(folder / "items.npy", what)

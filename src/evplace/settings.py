@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import json
+import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -35,6 +36,15 @@ def make(kind: type[S], values: Mapping[str, object], base: S | None = None) -> 
     hints = get_type_hints(kind)
     checked = {key: _as(hints[key], value, key) for key, value in values.items()}
     return kind(**checked) if base is None else dataclasses.replace(base, **checked)  # type: ignore[type-var]
+
+
+def check_numbers(given: object) -> None:
+    """SettingsError where a field of a dataclass, or of one within it, is a float that is no number."""
+    for field in dataclasses.fields(given):  # type: ignore[arg-type]
+        value = getattr(given, field.name)
+        if dataclasses.is_dataclass(value):
+            check_numbers(value)
+        _check_number(field.name, value)
 
 
 def to_dict(settings: object) -> dict[str, Any]:
@@ -71,6 +81,7 @@ def _as(hint: Any, value: object, key: str) -> object:
     """`value` as the type `hint`; an int is a fine float, a list is a fine tuple, a table is a dict."""
     options = getattr(hint, "__args__", ()) if not isinstance(hint, type) else ()
     origin = getattr(hint, "__origin__", None)
+    _check_number(key, value)
     if origin is tuple and isinstance(value, list | tuple):
         return tuple(value)
     if isinstance(value, Mapping) and dict in (
@@ -88,6 +99,11 @@ def _as(hint: Any, value: object, key: str) -> object:
         return value
     wanted = ", ".join([repr(option) for option in literal] + [option.__name__ for option in allowed])
     raise SettingsError(f"the setting '{key}' cannot be {value!r}: it takes {wanted}")
+
+
+def _check_number(key: str, value: object) -> None:
+    if isinstance(value, float) and math.isnan(value):
+        raise SettingsError(f"the setting '{key}' cannot be nan: it takes a number")
 
 
 def _is(value: object, allowed: tuple[type, ...]) -> bool:

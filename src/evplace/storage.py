@@ -24,16 +24,17 @@ from evplace.errors import InputError, OutputError
 
 
 @contextlib.contextmanager
-def new_folder(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
+def new_folder(path: str | Path, overwrite: bool = False, mark: str = "") -> Iterator[Path]:
     """A temporary folder beside `path` that takes its name when the block ends well, else vanishes.
 
-    Raises OutputError where `path` exists (unless `overwrite`), another process is writing it, or the
-    disk is full.
+    `overwrite` replaces a folder that was written as this one is: one that is empty, or holds a file
+    called `mark` (which may have wildcards). Raises OutputError where `path` exists otherwise, another
+    process is writing it, or the disk is full.
     """
-    target = Path(path)
+    target = named(path)
     partial = target.with_name(f".{target.name}.partial")
     with _explained(target, partial), locked(target):
-        _refuse_existing(target, overwrite)
+        check_new_folder(target, overwrite, mark)
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir()
         try:
@@ -49,12 +50,12 @@ def new_folder(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
 def new_file(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
     """A temporary file name beside `path`; what the block writes there takes its name when it ends well.
 
-    Raises OutputError as `new_folder` does.
+    `overwrite` replaces a file, never a folder. Raises OutputError as `new_folder` does.
     """
-    target = Path(path)
+    target = named(path)
     partial = target.with_name(f".{target.stem}.partial{target.suffix}")
     with _explained(target, partial), locked(target):
-        _refuse_existing(target, overwrite)
+        check_new_file(target, overwrite)
         try:
             yield partial
             _fsync(partial)
@@ -63,10 +64,41 @@ def new_file(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
             partial.unlink(missing_ok=True)
 
 
+def check_new_folder(path: str | Path, overwrite: bool, mark: str) -> None:
+    """OutputError where `new_folder` would refuse `path`: for saying so before the work."""
+    target = named(path)
+    _refuse_existing(target, overwrite)
+    if not target.exists():
+        return
+    if not target.is_dir():
+        raise OutputError(f"{target} is a file, which no folder replaces: choose another name, or remove it")
+    if any(target.iterdir()) and not (mark and any(target.glob(mark))):
+        raise OutputError(
+            f"{target} holds other things than what is to be written there (no {mark or 'sign of it'}), and "
+            "is not replaced: choose another name, or remove it yourself"
+        )
+
+
+def check_new_file(path: str | Path, overwrite: bool) -> None:
+    """OutputError where `new_file` would refuse `path`: for saying so before the work."""
+    target = named(path)
+    if target.is_dir():
+        raise OutputError(f"{target} is a folder, which no file replaces: choose the name of a file")
+    _refuse_existing(target, overwrite)
+
+
+def named(path: str | Path) -> Path:
+    """`path`, if it ends in a name that an output can have; OutputError where it is . or .. or a disk."""
+    target = Path(path)
+    if target.name in ("", ".."):
+        raise OutputError(f"'{path}' is no name of an output: give the name of what is to be written")
+    return target
+
+
 @contextlib.contextmanager
 def locked(target: Path) -> Iterator[None]:
     """Hold the one writer's place for `target`; OutputError if another process holds it, or it cannot be."""
-    lock = target.with_name(f".{target.name}.lock")
+    lock = named(target).with_name(f".{target.name}.lock")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)

@@ -20,6 +20,8 @@ from evplace.storage import GrowingArray, new_folder, read_array, read_json, wri
 from evplace.tracks import Track
 
 FORMAT = "evplace-traverse-1"
+MARK = "traverse.json"
+"""What tells a folder that was written here from any other: only such a one is replaced."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +74,7 @@ class Traverse:
         """The traverse in the folder `path`; TraverseError where it is none or is damaged."""
         folder = Path(path)
         try:
-            info = read_json(folder / "traverse.json", f"the traverse {folder}")
+            info = read_json(folder / MARK, f"the traverse {folder}")
             if info.get("format") != FORMAT:
                 raise TraverseError(
                     f"{folder} is no traverse of this version: its format is {info.get('format')}"
@@ -128,7 +130,7 @@ class TraverseWriter:
         if self.track is not None:
             _save_track(self._folder, self.track)
             zone = {"zone": self.track.zone, "northern": self.track.northern}
-        write_json(self._folder / "traverse.json", {"format": FORMAT, "track": zone, "info": self.info})
+        write_json(self._folder / MARK, {"format": FORMAT, "track": zone, "info": self.info})
 
     def discard(self) -> None:
         """Let go of a traverse that will not be used; harmless after `close`."""
@@ -141,7 +143,7 @@ def new_traverse(
     path: str | Path, info: Mapping[str, Any], overwrite: bool = False
 ) -> Iterator[TraverseWriter]:
     """A writer for the folder `path`, which appears whole when the block ends well."""
-    with new_folder(path, overwrite) as folder:
+    with new_folder(path, overwrite, MARK) as folder:
         writer = TraverseWriter(folder, info)
         try:
             yield writer

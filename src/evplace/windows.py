@@ -15,10 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from evplace.errors import SettingsError
+from evplace.errors import RecordingError, SettingsError
 from evplace.events import Events
 
 MICROSECONDS = 1_000_000
+MOST_EMPTY = 100_000
+"""Windows without events, one after another, that are still believed: half an hour at 1/60 s."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +71,13 @@ class TimeWindows:
         self._origin_us = origin_us
         self._open = 1
         self._events = 0
+        self._begun = False
 
     def push(self, events: Events) -> Iterator[tuple[Events, Window | None]]:
-        """The packet in pieces, in order, each with the window that it closes, if it closes one."""
+        """The packet in pieces, in order, each with the window that it closes, if it closes one.
+
+        RecordingError where the times leap ahead by more than MOST_EMPTY windows.
+        """
         if not len(events):
             return
         if self._origin_us is None:
@@ -82,12 +88,25 @@ class TimeWindows:
             # A later event is what shows that a window is over.
             stop = start + int(np.searchsorted(events.t_us[start:], end_us, side="right"))
             self._events += stop - start
+            if stop < len(events) and self._begun:
+                self._check_leap(int(events.t_us[stop]), end_us)
+            self._begun = True
             yield events[start:stop], (self._close() if stop < len(events) else None)
             start = stop
 
     def finish(self) -> Window | None:
         """The last window, which no later event has closed; None where there never was an event."""
         return self._close() if self._events else None
+
+    def _check_leap(self, t_us: int, end_us: int) -> None:
+        """Whether the windows between an end and the next event can be empty ones of a recording."""
+        empty = int((t_us - end_us) / self._dt)
+        if empty > MOST_EMPTY:
+            raise RecordingError(
+                f"the clock leaps: from {end_us / MICROSECONDS:.3f} s to {t_us / MICROSECONDS:.3f} s no "
+                f"event comes, which makes {empty:,} empty images: cut the recording there, or mend its "
+                "times (is it the right --time-unit?)"
+            )
 
     def _close(self) -> Window:
         window = Window(self._open, self._end_us(self._open), self._events)

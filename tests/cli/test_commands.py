@@ -171,3 +171,29 @@ def test_a_folder_of_images_with_a_list(tmp_path: Path, capsys: Capture) -> None
     assert said(capsys, *command, "--fps", 10)["images"] == 2
     assert np.load(tmp_path / "t" / "images.npy")[:, 0, 0].tolist() == [2, 0]
     assert np.load(tmp_path / "t" / "t_us.npy").tolist() == [0, 100_000]
+
+
+def test_a_settings_file_may_say_a_default(tmp_path: Path, capsys: Capture) -> None:
+    write_drive(tmp_path, "day", make_drive(windows=4))
+    toml = tmp_path / "s.toml"
+    command = ("images", tmp_path / "day.aedat4", "--settings", toml, "-o")
+    for number, blur in enumerate((True, False)):
+        toml.write_text(f"json = false\n[images]\nblur = {str(blur).lower()}\n[cleaning]\nmask_hot = false\n")
+        said(capsys, *command, tmp_path / f"{number}")
+        info = json.loads((tmp_path / f"{number}" / "traverse.json").read_text())["info"]
+        assert info["images"]["blur"] is blur
+
+
+def test_a_track_that_needs_settings(tmp_path: Path, capsys: Capture) -> None:
+    write_drive(tmp_path, "day", make_drive(windows=20))
+    lines = (tmp_path / "day.csv").read_text().splitlines()
+    rows = [line.split(",") for line in lines[1:]]
+    odd = [f"{(int(t_us) - 5_000_000) / 1e6},{lat},{lon}" for t_us, lat, lon in rows]
+    (tmp_path / "odd.csv").write_text("\n".join(["when,latitude,longitude", *odd]))
+    command = ("images", tmp_path / "day.aedat4", "-o")
+    plain = said(capsys, *command, tmp_path / "plain", "--track", tmp_path / "day.csv")
+    flags = ("--track-preset", "robotcar", "--track-set", "time=when", "--track-set", "time_unit=s")
+    shifted = ("--track", tmp_path / "odd.csv", *flags, "--track-offset", 5)
+    assert said(capsys, *command, tmp_path / "odd", *shifted) == plain
+    tracks = [np.load(tmp_path / name / "track.npy") for name in ("plain", "odd")]
+    np.testing.assert_allclose(*tracks)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import importlib.util
 import json
 import os
 import signal
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from conftest import make_drive, write_drive
 from evplace import storage
@@ -84,6 +86,22 @@ def test_settings_files(folder: Path, capsys: Capture) -> None:
     assert "unknown setting 'length'" in fault(capsys, *start)
     toml.write_text("[colours]\n")
     assert "known are" in fault(capsys, *start)
+
+
+def test_settings_files_of_the_wrong_kind(folder: Path, capsys: Capture) -> None:
+    toml = folder / "s.toml"
+    start = ("images", folder / "day.aedat4", "-o", folder / "x", "--settings", toml)
+    toml.write_text("images = 3\n")
+    assert "it is a table, [images]" in fault(capsys, *start)
+    toml.write_text("[images]\nblur = 3\n")
+    assert "true or false" in fault(capsys, *start)
+    toml.write_text("[images]\ntau_ms = nan\n")
+    assert "'tau_ms' cannot be nan" in fault(capsys, *start)
+    assert "'tau_ms' cannot be nan" in fault(capsys, *start[:4], "--tau-ms", "nan")
+    assert "cannot be nan" in fault(
+        capsys, "train", folder / "day.aedat4", "--track", folder / "day.csv", "-o", folder / "m",
+        "--cell-m", "nan",
+    )  # fmt: skip
 
 
 def test_files_that_are_no_recordings(folder: Path, capsys: Capture) -> None:
@@ -164,6 +182,18 @@ def test_tracks(folder: Path, capsys: Capture) -> None:
     (folder / "nofix.nmea").write_text("$GPRMC,134730.361,V,,,,,,,041112,,,N*4C\n")
     assert "nofix.nmea" in fault(capsys, *start, "--track", folder / "nofix.nmea")
     assert not (folder / "m").exists()
+    for shift in ("-1000000", "1000000"):
+        told = fault(
+            capsys, "images", folder / "day.aedat4", "-o", folder / "x", "--track", folder / "day.csv",
+            "--track-offset", shift, "--every-m", "2",
+        )  # fmt: skip
+        assert "do not overlap" in told
+    assert "--track-preset" in fault(
+        capsys, "images", folder / "day.aedat4", "-o", folder / "x", "--track-offset", "1"
+    )
+    assert "cannot be shifted" in fault(
+        capsys, *start, "--track", folder / "day.csv", "--track-offset", "inf"
+    )
 
 
 def test_one_place_only_is_a_map(folder: Path, capsys: Capture) -> None:
@@ -237,6 +267,59 @@ def test_an_output_that_exists(folder: Path, street: Path, capsys: Capture) -> N
         told = fault(capsys, *command)
         assert "exists" in told or "suffix" in told
     assert (taken / "mine").read_text() == "mine"
+
+
+def test_what_is_not_ours_is_never_replaced(folder: Path, street: Path, capsys: Capture) -> None:
+    day, track = folder / "day.aedat4", ("--track", folder / "day.csv")
+    pictures = folder / "pictures"
+    pictures.mkdir()
+    Image.fromarray(np.zeros((20, 30), np.uint8)).save(pictures / "1.png")
+    main(["images", f"{day}", *map(str, track), "-o", f"{folder}/made"])
+    for command in (
+        ("images", pictures, "-o", pictures),
+        ("images", day, "-o", day),
+        ("train", day, *track, "-o", pictures, "--scorer", "sad"),
+        ("evaluate", street, day, *track, "-o", pictures),
+        ("evaluate", street, day, *track, "-o", street),
+        ("localize", street, day, "-o", pictures),
+        ("convert", folder / "made", pictures),
+        ("doctor", day, "--report", pictures),
+        ("images", day, "-o", folder / "x", "--sheet", pictures),
+    ):
+        fault(capsys, *command, "--overwrite")
+    assert left(pictures) == ["1.png"]
+    assert main(["images", f"{day}", *map(str, track), "-o", f"{folder}/made", "--overwrite"]) == 0
+    assert not (folder / "x").exists()
+
+
+def test_outputs_need_a_name(
+    folder: Path, street: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    day, track = folder / "day.aedat4", ("--track", folder / "day.csv")
+    monkeypatch.chdir(folder)
+    for command in (
+        ("images", day, "-o", "."),
+        ("train", day, *track, "-o", ".", "--scorer", "sad"),
+        ("evaluate", street, day, *track, "-o", "."),
+        ("localize", street, day, "-o", "."),
+        ("doctor", day, "--report", "."),
+    ):
+        assert "no name of an output" in fault(capsys, *command, "--overwrite")
+
+
+def test_a_sheet_that_exists_is_told_before_the_work(folder: Path, capsys: Capture) -> None:
+    (folder / "sheet.png").write_text("mine")
+    command = ("images", folder / "day.aedat4", "-o", folder / "x", "--sheet", folder / "sheet.png")
+    assert "exists" in fault(capsys, *command)
+    assert not (folder / "x").exists()
+
+
+def test_a_report_without_matplotlib_is_told_before_the_work(
+    folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    # The recording does not exist: what is missing is said before it is looked at.
+    assert "matplotlib" in fault(capsys, "doctor", folder / "none.aedat4", "--report", folder / "x")
 
 
 def test_a_full_disk(folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,8 @@ import pytest
 from PIL import Image
 
 from evplace.doctor import Curve, Examination, examine
+from evplace.errors import SettingsError
+from evplace.frames import open_frames
 
 
 def film(folder: Path, places: list[float], times_s: list[float] | None = None) -> Path:
@@ -67,7 +69,24 @@ def test_a_hole_and_made_up_times(tmp_path: Path) -> None:
     (tmp_path / "timestamps.txt").unlink()
     made_up = examine(tmp_path, fps=25).named("frame times")
     assert (made_up.state, made_up.value) == ("look", pytest.approx(25))
-    assert "--fps" in made_up.advice
+    assert "--fps" in made_up.sentence
+    assert "--fps" not in made_up.advice
+
+
+@pytest.mark.parametrize("unit", [1e6, 1e-3])
+def test_times_in_the_wrong_unit_are_bad(tmp_path: Path, unit: float) -> None:
+    times = [time * unit for time in even(20, 55)]
+    found = examine(film(tmp_path, there_and_back(20, 0.5), times)).named("frame times")
+    assert found.state == "bad"
+    assert "in seconds?" in found.advice
+
+
+@pytest.mark.parametrize("fps", [0.0, -1.0, float("nan"), float("inf"), 1e9])
+def test_rates_that_cannot_be(tmp_path: Path, fps: float) -> None:
+    with pytest.raises(SettingsError, match="'fps'"):
+        examine(film(tmp_path, there_and_back(3, 0.5)), fps=fps)
+    with pytest.raises(SettingsError, match="'fps'"):
+        open_frames(tmp_path, fps=fps)
 
 
 def test_frames_of_two_sizes(tmp_path: Path) -> None:

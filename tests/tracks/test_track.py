@@ -70,3 +70,38 @@ def test_wrong_shapes_and_orders_are_refused() -> None:
         Track.local([0, 1], [[0, 0]])
     with pytest.raises(TrackError, match="increase"):
         Track.local([1, 1], [[0, 0], [0, 0]])
+
+
+def by_the_whole_track(track: Track, t_us: list[int]) -> np.ndarray:
+    """The headings of `Track.at`, from the sines and cosines of all fixes."""
+    here = track.at(t_us)
+    after = np.searchsorted(track.t_us, t_us)
+    right = np.clip(after, 0, len(track) - 1)
+    left = np.where(track.t_us[right] == t_us, right, np.maximum(after - 1, 0))
+    share = (np.array(t_us) - track.t_us[left]) / np.maximum(track.t_us[right] - track.t_us[left], 1)
+    turn = np.deg2rad(track.heading_deg)
+    east, north = (part[left] + share * (part[right] - part[left]) for part in (np.sin(turn), np.cos(turn)))
+    return np.where(here.known, np.rad2deg(np.arctan2(east, north)) % 360, np.nan)
+
+
+@given(
+    st.lists(st.integers(0, 5_000_000), min_size=1, max_size=30, unique=True).map(sorted),
+    st.lists(st.integers(0, 5_000_000), min_size=1, max_size=30),
+    st.integers(0, 1000),
+)
+def test_headings_come_of_the_neighbours_alone(times: list[int], wanted: list[int], seed: int) -> None:
+    heading = np.random.default_rng(seed).uniform(0, 360, len(times))
+    track = Track.local(times, np.zeros((len(times), 2)), heading)
+    found, twin = track.at(wanted), by_the_whole_track(track, wanted)
+    apart = (found.heading_deg - twin + 180) % 360 - 180
+    np.testing.assert_array_equal(np.isnan(apart), ~found.known)
+    np.testing.assert_allclose(apart[found.known], 0, atol=1e-6)
+
+
+def test_one_time_costs_no_more_in_a_long_track(monkeypatch: pytest.MonkeyPatch) -> None:
+    track = straight([float(second) for second in range(1000)])
+    asked: list[int] = []
+    sine = np.sin
+    monkeypatch.setattr(np, "sin", lambda values: (asked.append(np.size(values)), sine(values))[1])
+    track.at([500_000])
+    assert max(asked) == 1

@@ -29,6 +29,8 @@ from evplace.writers import write_recording
 COLOUR = "colour"
 """Folder of the colour traverse, beside one for each sensor."""
 
+MARK = "poses.npy"
+"""What tells a folder that was written here from any other: only such a one is replaced."""
 PACKET = 1 << 17
 """Events that are written at a time."""
 
@@ -41,7 +43,7 @@ def record_drive(out: Path, town: Town, settings: CitySettings, name: str, path:
     size = (settings.width, settings.height)
     film = Film(town, path, name, size, settings.seed, settings.route_length_m or None)
     with (
-        new_folder(out / drive_name(name, path), overwrite=True) as folder,
+        new_folder(out / drive_name(name, path), overwrite=True, mark=MARK) as folder,
         contextlib.ExitStack() as open_now,
     ):
         info = {"source": VERSION, "condition": name, "path": path, **settings.of_drive()}
@@ -54,7 +56,7 @@ def record_drive(out: Path, town: Town, settings: CitySettings, name: str, path:
         poses = np.array(_drive(film, settings, sensors, colour, drive_number(name, path), tick))
         for writer in (colour, *(sensor.writer for sensor in sensors)):
             writer.track = _track(np.array(colour.t_us), poses)
-        np.save(folder / "poses.npy", poses)
+        np.save(folder / MARK, poses)
 
 
 def _drive(

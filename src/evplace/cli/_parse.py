@@ -21,7 +21,8 @@ def parse(module: ModuleType, name: str, arguments: list[str]) -> Any:
     Prints the help and exits with `--help`; SettingsError for a wrong flag.
     """
     said = io.StringIO()
-    flags = _from_file(module.Args, arguments) + arguments
+    values, where = _from_file(arguments)
+    flags = _flags(module.Args, values, where) + arguments
     try:
         with contextlib.redirect_stderr(said):
             args = tyro.cli(
@@ -35,7 +36,15 @@ def parse(module: ModuleType, name: str, arguments: list[str]) -> Any:
         if not stop.code:
             raise
         raise SettingsError(f"{_plain(said.getvalue())}; see evplace {name} --help") from None
-    return dataclasses.replace(args, given=_names(flags)) if hasattr(args, "given") else args
+    settings.check_numbers(args)
+    given = (*_names(flags), *_keys(values))
+    return dataclasses.replace(args, given=given) if hasattr(args, "given") else args
+
+
+def _keys(values: dict[str, Any]) -> list[str]:
+    """The names in a settings file, those in its tables among them."""
+    inner = [key for table in values.values() if isinstance(table, dict) for key in _keys(table)]
+    return [*values, *inner]
 
 
 def _names(flags: list[str]) -> tuple[str, ...]:
@@ -51,32 +60,45 @@ def _plain(message: str) -> str:
     return " ".join(kept) or "the flags cannot be read"
 
 
-def _from_file(kind: type[Any], arguments: list[str]) -> list[str]:
-    """What the file after `--settings` says, as flags."""
+def _from_file(arguments: list[str]) -> tuple[dict[str, Any], str]:
+    """What the file after `--settings` says, and the file's name."""
     if "--settings" not in arguments[:-1]:
-        return []
+        return {}, ""
     file = Path(arguments[arguments.index("--settings") + 1])
-    return _flags(kind, settings.from_toml(file), str(file))
+    return settings.from_toml(file), str(file)
 
 
 def _flags(kind: type[Any], values: dict[str, Any], where: str) -> list[str]:
     hints = get_type_hints(kind)
-    known = sorted(field.name for field in dataclasses.fields(kind) if field.name != "given")
+    fields = {field.name: field for field in dataclasses.fields(kind) if field.name != "given"}
+    known = sorted(fields)
     flags: list[str] = []
     for key, value in values.items():
         if key not in known:
             raise SettingsError(f"unknown setting '{key}' in {where}: known are {', '.join(known)}")
         if dataclasses.is_dataclass(hints[key]):
+            if not isinstance(value, dict):
+                raise SettingsError(f"'{key}' in {where} cannot be {value!r}: it is a table, [{key}]")
             flags += _flags(hints[key], value, f"[{key}] of {where}")
+        elif hints[key] is bool:
+            flags += _switch(key, value, fields[key].default, where)
         else:
             flags += _flag(key, value)
     return flags
 
 
+def _switch(key: str, value: object, default: object, where: str) -> list[str]:
+    """The flag of a boolean, which only says what differs from its default."""
+    if not isinstance(value, bool):
+        raise SettingsError(f"'{key}' in {where} cannot be {value!r}: it takes true or false")
+    if value == default:
+        return []
+    name = key.replace("_", "-")
+    return [f"--{name}" if value else f"--no-{name}"]
+
+
 def _flag(key: str, value: object) -> list[str]:
     name = key.replace("_", "-")
-    if isinstance(value, bool):
-        return [f"--{name}" if value else f"--no-{name}"]
     if isinstance(value, dict):
         return [word for pair in value.items() for word in (f"--{name}", "=".join(map(_text, pair)))]
     if isinstance(value, list):

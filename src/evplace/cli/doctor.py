@@ -21,8 +21,8 @@ from typing import Literal
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, print_json
-from evplace.doctor import STATES, Examination, Finding, as_json, draw, examine
-from evplace.errors import OutputError
+from evplace.cli._track import TrackFlags
+from evplace.doctor import STATES, Examination, Finding, as_json, check_drawing, draw, examine
 
 WIDTH = 110
 """Columns of the text."""
@@ -31,13 +31,11 @@ WORDS = {"bad": "bad", "look": "to look at", "unknown": "unknown", "good": "good
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(TrackFlags):
     """Flags of `evplace doctor`."""
 
     recording: tyro.conf.Positional[Path]
     """An event recording, a video, or a folder of images."""
-    track: Path | None = None
-    """GPS log of the same drive: NMEA, GPX or csv."""
     dt: str = "1/30"
     """Length of a window in seconds, as a fraction or a decimal."""
     size: tuple[int, int] | None = None
@@ -56,9 +54,9 @@ class Args:
 
 def run(args: Args) -> int:
     """Examine, print, and draw if asked."""
-    if args.report is not None and args.report.exists() and not args.overwrite:
-        raise OutputError(f"{args.report} exists: choose another name, remove it, or add --overwrite")
-    found = examine(args.recording, args.track, args.dt, args.size, args.time_unit, args.fps)
+    if args.report is not None:
+        check_drawing(args.report, args.overwrite)
+    found = examine(args.recording, args.opened_track(), args.dt, args.size, args.time_unit, args.fps)
     if args.report is not None:
         draw(found, args.report, args.overwrite)
     if args.json:

@@ -21,10 +21,13 @@ from evplace import settings
 from evplace.capture import open_traverse
 from evplace.charts import curve_chart
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
-from evplace.errors import MissingExtraError, OutputError
+from evplace.cli._track import TrackFlags
+from evplace.errors import MissingExtraError
+from evplace.evaluation import MARK
 from evplace.images import ImageSettings
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
+from evplace.storage import check_new_folder
 from evplace.traverse import Traverse
 from evplace.trial import evaluate
 from evplace.truth import Truth, by_frames, by_matrix
@@ -38,7 +41,7 @@ SHOWN = (
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(TrackFlags):
     """Flags of `evplace evaluate`."""
 
     map: tyro.conf.Positional[Path]
@@ -47,8 +50,6 @@ class Args:
     """The query drive: an event recording, a folder of images, or a traverse folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The result folder to write."""
-    track: Path | None = None
-    """GPS log of the query drive: NMEA, GPX or csv."""
     truth: Path | None = None
     """A .npy matrix of 0 and 1, rows = queries, columns = map items, in place of positions."""
     frames: int | None = None
@@ -79,8 +80,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Localise the drive, measure, save and print."""
-    if args.out.exists() and not args.overwrite:
-        raise OutputError(f"{args.out} exists: choose another name, remove it, or add --overwrite")
+    check_new_folder(args.out, args.overwrite, MARK)
     place_map = PlaceMap.load(args.map)
     values = settings.from_pairs(args.set)
     where = Localizer(place_map, args.matcher, args.preset, args.mask, **values)
@@ -106,7 +106,7 @@ def _opened(args: Args, where: Localizer) -> Traverse:
     windows = settings.make(WindowSettings, where.map.settings.get("windows") or {})
     images = settings.make(ImageSettings, where.map.settings.get("images") or {})
     return open_traverse(
-        args.drive, args.track, windows, images, args.size, args.time_unit, where.cleaning,
+        args.drive, args.opened_track(), windows, images, args.size, args.time_unit, where.cleaning,
         mask=where.mask, kind=where.map.settings.get("input"),
     )  # fmt: skip
 

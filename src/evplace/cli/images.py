@@ -24,9 +24,11 @@ import tyro
 from evplace.capture import open_source, record
 from evplace.cleaning import CleaningSettings
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
+from evplace.cli._track import TrackFlags
 from evplace.images import ImageSettings
 from evplace.sheets import contact_sheet
 from evplace.spacing import SpacingSettings
+from evplace.storage import check_new_file
 from evplace.traverse import Traverse, TraverseWriter, new_traverse
 from evplace.windows import WindowSettings
 
@@ -34,15 +36,13 @@ S = TypeVar("S", WindowSettings, ImageSettings)
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(TrackFlags):
     """Flags of `evplace images`."""
 
     source: tyro.conf.Positional[Path]
     """An event recording, a video, a folder of images, or a data set's folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The traverse folder to write."""
-    track: Path | None = None
-    """GPS log of the same drive: NMEA, GPX or csv."""
     size: tuple[int, int] | None = None
     """Width and height of the sensor in pixels, where the file does not say."""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
@@ -77,6 +77,8 @@ class Args:
 
 def run(args: Args) -> int:
     """Write the traverse, and the sheet if asked."""
+    if args.sheet is not None:
+        check_new_file(args.sheet, args.overwrite)
     with new_traverse(args.out, {}, args.overwrite) as writer:
         fault = _record(args, writer)
     traverse = Traverse.load(args.out)
@@ -110,7 +112,15 @@ def _record(args: Args, writer: TraverseWriter) -> str | None:
     windows, images = _over(drive.windows, args.windows, args), _over(drive.images, args.images, args)
     with remarks():
         return record(
-            drive, writer, args.track, windows, images, args.cleaning, args.spacing, args.mask, args.kind
+            drive,
+            writer,
+            args.opened_track(),
+            windows,
+            images,
+            args.cleaning,
+            args.spacing,
+            args.mask,
+            args.kind,
         )
 
 

@@ -23,26 +23,27 @@ from evplace import settings as settings_room
 from evplace.capture import open_traverse
 from evplace.cleaning import CleaningSettings
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
-from evplace.errors import OutputError, TraverseError
+from evplace.cli._track import TrackFlags
+from evplace.errors import TraverseError
 from evplace.images import ImageSettings
+from evplace.placemap import MARK
 from evplace.places import PlaceGrid, PlaceRuns, Places
 from evplace.scorers import checked_settings
 from evplace.spacing import SpacingSettings
+from evplace.storage import check_new_folder
 from evplace.training import PRESETS, TrainSettings, train
 from evplace.traverse import Traverse
 from evplace.windows import WindowSettings
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(TrackFlags):
     """Flags of `evplace train`."""
 
     drive: tyro.conf.Positional[Path]
     """The drive to learn: an event recording, a folder of images, or a traverse folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The map to write."""
-    track: Path | None = None
-    """GPS log of the drive: NMEA, GPX or csv."""
     cell_m: float = 20.0
     """Side of a place in metres (paper: rho = 20)."""
     run_length: int = 0
@@ -76,11 +77,10 @@ class Args:
 
 def run(args: Args) -> int:
     """Learn and save the map."""
-    if args.out.exists() and not args.overwrite:  # said before the training, not after it
-        raise OutputError(f"{args.out} exists: choose another name, remove it, or add --overwrite")
+    check_new_folder(args.out, args.overwrite, MARK)  # said before the training, not after it
     scorer_settings = checked_settings(args.scorer, settings_room.from_pairs(args.set))
     day = open_traverse(
-        args.drive, args.track, args.windows, args.images, args.size, args.time_unit,
+        args.drive, args.opened_track(), args.windows, args.images, args.size, args.time_unit,
         args.cleaning, args.spacing, args.mask,
     )  # fmt: skip
     places = _places(args, day)

@@ -40,6 +40,8 @@ SPLITS = ("", "test", "images/test")
 _NORTH = "NPQRSTUVWX"
 _SOUTH = "CDEFGHJKLM"
 _NOTE = re.compile(r"t(-?\d+)us")
+MARK = "@*@t*us@.jpg"
+"""What tells a folder that was written here from any other: only such a one is replaced."""
 _QUALITY = 95
 
 
@@ -93,7 +95,7 @@ def write_images(traverse: Traverse, folder: str | Path, overwrite: bool = False
         raise TraverseError(
             f"images of {traverse.images.shape[-1]} channels cannot be written as .jpg: make them grey or RGB"
         )
-    with new_folder(folder, overwrite) as made:
+    with new_folder(folder, overwrite, MARK) as made:
         for n in np.flatnonzero(track.known):
             image = Image.fromarray(np.ascontiguousarray(traverse.images[n]))
             name = _image_name(track, int(n), int(traverse.t_us[n]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,18 @@ import numpy as np
 
 from evplace.doctor._outcome import Curve, Examination, Map
 from evplace.errors import MissingExtraError
-from evplace.storage import new_folder, write_json
+from evplace.storage import check_new_folder, new_folder, write_json
 
+FINDINGS = "findings.json"
+"""What tells a folder that was written here from any other: only such a one is replaced."""
 INK, SHADE, MARK = "#1b6ca8", "#efb998", "#c4622d"
+
+
+def check_drawing(folder: str | Path, overwrite: bool = False) -> None:
+    """Raises what `draw` would raise: for saying so before an examination, which may take minutes."""
+    if importlib.util.find_spec("matplotlib") is None:
+        raise MissingExtraError("matplotlib", "report", "drawing an examination")
+    check_new_folder(folder, overwrite, FINDINGS)
 
 
 def draw(examination: Examination, folder: str | Path, overwrite: bool = False) -> None:
@@ -20,12 +30,11 @@ def draw(examination: Examination, folder: str | Path, overwrite: bool = False) 
 
     MissingExtraError without matplotlib; OutputError where the folder exists and is not to be replaced.
     """
-    try:
-        from matplotlib.figure import Figure
-    except ModuleNotFoundError as error:
-        raise MissingExtraError("matplotlib", "report", "drawing an examination") from error
-    with new_folder(folder, overwrite) as partial:
-        write_json(partial / "findings.json", as_json(examination))
+    check_drawing(folder, overwrite)
+    from matplotlib.figure import Figure
+
+    with new_folder(folder, overwrite, FINDINGS) as partial:
+        write_json(partial / FINDINGS, as_json(examination))
         for drawing in examination.drawings:
             figure = Figure(figsize=(9, 4.5), layout="constrained")
             axes = figure.add_subplot(title=drawing.title)

@@ -12,7 +12,7 @@ from evplace.doctor._outcome import STATES, Examination, Finding, Outcome
 from evplace.doctor._subject import Subject
 from evplace.errors import DamagedRecordingError, InputError, TrackError
 from evplace.events import Events, Size
-from evplace.frames import is_frames
+from evplace.frames import check_rate, is_frames
 from evplace.readers import open_recording
 from evplace.simulators.frames import VIDEOS, Film, open_film
 from evplace.simulators.motion import Frame
@@ -43,9 +43,10 @@ def examine(
     `dt` is the length of a window in seconds, as of `WindowSettings`; `size` and `time_unit` are for
     recordings that do not say (see `open_recording`), `fps` for folders of images without times. A damaged
     recording's good part is examined. InputError where something cannot be read, SettingsError for a `dt`
-    of no length.
+    of no length or an `fps` that cannot be.
     """
     windows = WindowSettings(dt)
+    check_rate(fps)
     positions = _known(open_track(track) if isinstance(track, str | Path) else track)
     if _is_film(Path(path)):
         return _film(open_film(path, fps), windows, positions)

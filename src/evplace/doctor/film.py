@@ -12,6 +12,10 @@ from evplace.simulators.motion import TOO_FAST, Frame, image_motion
 OF = ("frames",)
 
 
+SLOWEST_FPS, FASTEST_FPS = 0.1, 10_000.0
+"""Frames a second beyond which the times must be in another unit."""
+
+
 class Check:
     """Measures the motion from each frame to the next."""
 
@@ -71,9 +75,12 @@ def _times(steps: NDArray[np.int64], fps: float, timed: bool) -> Finding:
     told = f"{len(steps) + 1:,} frames, {fps:.1f} a second; {counted(late, 'comes', 'come')} late."
     if not timed:
         return Finding(
-            "frame times", "look", fps, "frames/s", f"{told} The folder has no times: the rate is made up.",
-            "put timestamps.txt (seconds, one a line) beside the images, or give --fps",
+            "frame times", "look", fps, "frames/s", f"{told} It has no times: the rate is that of --fps.",
+            "put timestamps.txt (seconds, one a line) beside the images",
         )  # fmt: skip
+    if not SLOWEST_FPS <= fps <= FASTEST_FPS:
+        told = f"{len(steps) + 1:,} frames, {fps:.3g} a second: no camera does that."
+        return Finding("frame times", "bad", fps, "frames/s", told, "are the times in seconds?")
     state: State = "good" if not late else "look" if late < 0.01 * len(steps) else "bad"
     advice = "" if state == "good" else "frames are missing: the motion across a hole is guessed"
     return Finding("frame times", state, fps, "frames/s", told, advice)

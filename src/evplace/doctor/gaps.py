@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from evplace.doctor._outcome import Finding, Outcome, State, counted
+from evplace.doctor._silences import LEAP_US
 from evplace.doctor._subject import Subject
 from evplace.events import Events
 
@@ -28,6 +29,8 @@ class Check:
             return Outcome([Finding("gaps", "good", 0.0, "s", "The stream of events has no gap.")])
         lengths = (ends - starts) / 1e6
         longest, total = int(lengths.argmax()), float(lengths.sum())
+        if lengths[longest] * 1e6 > LEAP_US:
+            return Outcome([_leap(float(self._subject.seconds(starts)[longest]), float(lengths[longest]))])
         state: State = "bad" if total > MUCH * self._subject.span_s else "look"
         told = (
             f"The whole sensor is silent {counted(len(starts), 'time', 'times')}, {total:.3f} s in all; the "
@@ -35,3 +38,11 @@ class Check:
         )
         advice = "events are missing: check cable, hub and disk, or lower the event rate by the biases"
         return Outcome([Finding("gaps", state, total, "s", told, advice)])
+
+
+def _leap(at_s: float, length_s: float) -> Finding:
+    return Finding(
+        "gaps", "bad", length_s, "s",
+        f"The clock leaps ahead by {length_s:,.0f} s at {at_s:.3f} s: no event comes for over an hour.",
+        "cut the recording there, or mend its times; check the --time-unit",
+    )  # fmt: skip

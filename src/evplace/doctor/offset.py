@@ -200,6 +200,6 @@ def _finding(offset: Offset) -> Finding:
         return Finding("clock offset", "good", offset.seconds, "s", told)
     state: State = "look" if away - offset.uncertainty_s < 2 else "bad"
     advice = (
-        f"open_track(..., offset_us={round(offset.seconds * 100) * 10_000}), or set both clocks by GPS time"
+        f"--track-offset {offset.seconds:.2f} (on top of one that was given), or set both clocks by GPS time"
     )
     return Finding("clock offset", state, offset.seconds, "s", told, advice)

@@ -32,13 +32,14 @@ from evplace.evaluation._measures import (
     hits_at,
     precision_recall,
 )
-from evplace.evaluation._result import OUTCOMES, Result
+from evplace.evaluation._result import MARK, OUTCOMES, Result
 from evplace.evaluation._samples import ItemImages, Samples, choose, pictures
 from evplace.matchers import Path as Answers
 from evplace.truth import Truth
 
 __all__ = [
     "CURVE",
+    "MARK",
     "OUTCOMES",
     "RECALLS_AT",
     "ItemImages",

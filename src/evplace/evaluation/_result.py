@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,11 @@ from evplace.evaluation._measures import CURVE, Bools, Floats
 from evplace.evaluation._samples import Samples
 from evplace.matchers import Path as Answers
 
+MARK = "pr_curve.npy"
+"""What tells a folder that was written here from any other: only such a one is replaced."""
 _MATCHES = ("query", "t_us", "item", "score", "accepted", "judged", "seen", "right", "true_item")
+_NEEDED = ("queries", "left_out", "items", "judged", "accuracy", "accuracy_seen", "average_precision")
+"""Figures that every result has; others depend on what was known."""
 
 OUTCOMES = ("right", "wrong", "missed", "unseen")
 """What became of a query: accepted and right (TP), accepted otherwise (FP), not accepted though seen (FN),
@@ -79,7 +84,7 @@ class Result:
 
         `with_scores` adds scores.npy. Raises OutputError where the folder cannot be written.
         """
-        with storage.new_folder(path, overwrite) as folder:
+        with storage.new_folder(path, overwrite, MARK) as folder:
             storage.write_json(folder / "result.json", self._summary())
             _write_matches(folder / "matches.csv", self)
             arrays = {
@@ -100,7 +105,8 @@ class Result:
         try:
             what = f"the result in {folder}"
             summary = storage.read_json(folder / "result.json", what)
-            curve = storage.read_array(folder / "pr_curve.npy", what).reshape(-1, len(CURVE))
+            curve = storage.read_array(folder / MARK, what).reshape(-1, len(CURVE))
+            _check_summary(summary)
             answers, columns = _read_matches(folder / "matches.csv")
             images = _kept(folder / "samples.npy")
             samples = Samples.of(summary["samples"], images) if images is not None else None
@@ -136,6 +142,28 @@ def _kept(path: Path, memory_mapped: bool = False) -> NDArray[Any] | None:
     if not path.exists():
         return None
     return storage.read_array(path, f"the result in {path.parent}", memory_mapped)
+
+
+def _check_summary(summary: dict[str, Any]) -> None:
+    """ValueError where result.json holds anything else than `Result._summary` puts there."""
+    for name in ("figures", "settings", "versions"):
+        if not isinstance(summary.get(name), dict):
+            raise ValueError(f"its {name} are no JSON object")
+    figures = summary["figures"]
+    for name in _NEEDED:
+        if name not in figures:
+            raise ValueError(f"the figure '{name}' is missing")
+    for name, value in figures.items():
+        if not (value is None or _is_number(value)):
+            raise ValueError(f"the figure '{name}' cannot be {value!r}")
+    if not isinstance(figures["items"], int):
+        raise ValueError(f"a map of {figures['items']} items")
+    if "took_s" in summary and not _is_number(summary["took_s"]):
+        raise ValueError(f"it took {summary['took_s']!r} s")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _check_fit(result: Result) -> None:

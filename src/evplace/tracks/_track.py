@@ -139,18 +139,22 @@ class Track:
         known &= exact | (span_us <= max_gap_s * 1e6) & (step_m <= max_gap_m)
         share = np.where(known & ~exact, (times - self.t_us[left]) / np.maximum(span_us, 1), 0.0)
 
-        def between(values: Floats) -> Floats:
-            mixed = values[left] + share * (values[right] - values[left])
-            return np.where(known, mixed, np.nan)
+        def between(start: Floats, end: Floats) -> Floats:
+            return np.where(known, start + share * (end - start), np.nan)
 
-        turn = np.deg2rad(self.heading_deg)
-        heading = np.rad2deg(np.arctan2(between(np.sin(turn)), between(np.cos(turn)))) % 360
+        def along(values: Floats) -> Floats:
+            return between(values[left], values[right])
+
+        # Of the neighbours only: a track is asked for one time after another, and may be long.
+        start, end = np.deg2rad(self.heading_deg[left]), np.deg2rad(self.heading_deg[right])
+        east, north = between(np.sin(start), np.sin(end)), between(np.cos(start), np.cos(end))
+        heading = np.rad2deg(np.arctan2(east, north)) % 360
         return Track(
             times,
-            between(self.latitude),
-            between(self.longitude),
-            between(self.easting),
-            between(self.northing),
+            along(self.latitude),
+            along(self.longitude),
+            along(self.easting),
+            along(self.northing),
             heading,
             self.zone,
             self.northern,
