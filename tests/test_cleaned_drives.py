@@ -178,7 +178,7 @@ def test_masks_of_every_kind(tmp_path: Path) -> None:
     twin = np.zeros((60, 80), np.bool_)
     twin[tuple(np.array(HOT).T[::-1])] = True
     text = tmp_path / "hot_pixels.txt"
-    text.write_text("# x,y\n5,7\n\n40 20  # a corner\r\n79, 59\n")
+    text.write_text("# hot\nx,y\n5,7\n\n40 20  # a corner\r\n79, 59\n")
     np.save(tmp_path / "pixels.npy", np.array(HOT))
     np.save(tmp_path / "mask.npy", twin)
     for given_mask in (text, tmp_path / "pixels.npy", tmp_path / "mask.npy", str(text), twin, np.array(HOT)):

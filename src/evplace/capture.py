@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Generic, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,12 @@ from evplace import datasets
 from evplace import settings as settings_room
 from evplace.cleaning import CleaningSettings, MaskSource, pixel_mask
 from evplace.datasets import Drive
-from evplace.errors import DamagedRecordingError, SettingsError, TrackError, TraverseError
-from evplace.events import Events, Size
+from evplace.errors import DamagedRecordingError, RecordingError, SettingsError, TrackError, TraverseError
+from evplace.events import Size
 from evplace.frames import is_frames, open_frames
 from evplace.images import ImageSettings, frame_image
 from evplace.readers import Recording, is_recording, open_recording
-from evplace.simulators.frames import Film, film_of, is_video, open_film
+from evplace.simulators.frames import VIDEOS, Film, film_of, is_video, open_film
 from evplace.simulators.recording import SimulatedRecording
 from evplace.spacing import Spacer, SpacingSettings
 from evplace.stream import EventImages, images_of
@@ -28,6 +28,7 @@ from evplace.tracks import Track, open_track
 from evplace.traverse import Traverse, TraverseWriter
 from evplace.windows import WindowSettings
 
+T = TypeVar("T")
 Kind = Literal["events", "frames"]
 """Event images, simulated where there are no events; or the camera's own images."""
 
@@ -83,28 +84,30 @@ def open_source(
     drive: str | None = None,
     dataset: str | None = None,
     listing: str | Path | None = None,
-    fps: float = 30.0,
+    fps: float | None = None,
 ) -> Drive:
     """What `path` holds, as a drive: see `open_traverse`; `listing` and `fps` as in `open_frames`.
 
-    `size` and `time_unit` are for a recording, `drive` and `dataset` for a data set's folder; SettingsError
-    where both are given.
+    A folder is a data set where it has the layout of one, whatever else lies in it. `size` and `time_unit`
+    are for a recording, `drive` and `dataset` for a data set's folder, `listing` and `fps` for a folder of
+    images; SettingsError where one is given that has no meaning for what `path` is.
     """
     place = Path(path)
-    if drive is not None or dataset is not None:
-        if size is not None or time_unit is not None:
-            raise SettingsError("a data set knows its sensor's size and its unit of time: leave these out")
+    of_recordings: dict[str, object] = {"--size": size, "--time-unit": time_unit}
+    of_images: dict[str, object] = {"--list": listing, "--fps": fps}
+    is_folder = place.is_dir() and not is_recording(place)
+    if drive is not None or dataset is not None or (is_folder and datasets.matching(place)):
+        _refuse(f"{place} is a data set, which has its own size, times and order", of_recordings | of_images)
         return datasets.open_drive(place, drive, dataset)
-    if is_frames(place):
-        return Drive(film_of(place, open_frames(place, listing, fps)))
     if is_video(place):
+        _refuse(f"{place} is a video, which has its own size and times", of_recordings | of_images)
         return Drive(open_film(place), simulate=True)
-    if place.is_dir() and not is_recording(place):
-        if datasets.matching(place):
-            return datasets.open_drive(place)
-        if is_frames(place / "images"):
-            return Drive(film_of(place / "images", open_frames(place / "images", listing, fps)))
-    return Drive(open_recording(place, size, time_unit=time_unit))
+    for images in (place, place / "images") if is_folder else ():
+        if is_frames(images):
+            _refuse(f"{images} holds images, which have their own size", of_recordings)
+            return Drive(_listed_film(images, listing, fps))
+    _refuse(f"{place} is no folder of images", of_images)
+    return Drive(_recording(place, size, time_unit))
 
 
 def record(
@@ -125,8 +128,7 @@ def record(
     source = _as(kind, drive)
     if isinstance(source, Film):
         check_uncleaned(source.path, cleaning, mask)
-        record_frames(source, writer, images, positions, spacing)
-        return None
+        return record_frames(source, writer, images, positions, spacing)
     return record_events(source, writer, windows, images, positions, cleaning, spacing, mask)
 
 
@@ -145,7 +147,7 @@ def record_events(
     cleaning, spacer = cleaning or CleaningSettings(), Spacer(spacing, track)
     writer.mask = pixel_mask(recording.packets(), recording.size, cleaning, mask)
     stream = EventImages(recording.size, windows, images, cleaning, writer.mask)
-    packets = _GoodPart(recording)
+    packets = _GoodPart(recording.packets())
     overlap = _Overlap(track)
     for image, window in images_of(packets, stream):
         overlap.see(window.t_us)
@@ -179,11 +181,11 @@ def record_frames(
     images: ImageSettings | None = None,
     track: Track | None = None,
     spacing: SpacingSettings | None = None,
-) -> None:
-    """Write camera images, cropped and resized as `images` says."""
+) -> str | None:
+    """Write camera images, cropped and resized as `images` says; returns what broke off, as above."""
     images, spacer = images or ImageSettings(), Spacer(spacing, track)
-    shape, overlap = None, _Overlap(track)
-    for n, (t_us, frame) in enumerate(film.images()):
+    shape, frames, overlap = None, _GoodPart(film.images()), _Overlap(track)
+    for n, (t_us, frame) in enumerate(frames):
         shape = shape or frame.shape
         if frame.shape != shape:
             raise TraverseError(
@@ -201,7 +203,37 @@ def record_frames(
         "images": settings_room.to_dict(images),
         "spacing": settings_room.to_dict(spacer.settings),
         "left_out": spacer.left_out,
+        "fault": frames.fault,
     }
+    return frames.fault
+
+
+def is_kept(drive: Drive, kind: Kind | None = None) -> bool:
+    """Whether camera images are kept as they are, so that settings of events mean nothing."""
+    return isinstance(_as(kind, drive), Film)
+
+
+def _refuse(what: str, flags: Mapping[str, object]) -> None:
+    """SettingsError where a flag is given that has no meaning."""
+    said = [flag for flag, value in flags.items() if value is not None]
+    if said:
+        raise SettingsError(f"{what}: leave out {' and '.join(said)}")
+
+
+def _listed_film(folder: Path, listing: str | Path | None, fps: float | None) -> Film:
+    frames = open_frames(folder, listing) if fps is None else open_frames(folder, listing, fps)
+    if frames.timed:
+        _refuse(f"the images in {folder} have times of their own", {"--fps": fps})
+    return film_of(folder, frames)
+
+
+def _recording(place: Path, size: Size | None, time_unit: str | None) -> Recording:
+    try:
+        return open_recording(place, size, time_unit=time_unit)
+    except RecordingError as error:
+        if not place.is_file() or not place.stat().st_size or is_recording(place):
+            raise
+        raise RecordingError(f"{error}; videos are {', '.join(VIDEOS)}") from error
 
 
 def _check_made_so(
@@ -292,15 +324,15 @@ def _seconds(t_us: NDArray[np.int64]) -> str:
     return f"{t_us[0] / 1e6:.3f} s to {t_us[-1] / 1e6:.3f} s"
 
 
-class _GoodPart:
-    """A recording's packets up to where it broke off; what broke it off is kept in `fault`."""
+class _GoodPart(Generic[T]):
+    """Packets, or images, up to where they broke off; what broke them off is kept in `fault`."""
 
-    def __init__(self, recording: Recording | SimulatedRecording) -> None:
-        self._recording = recording
+    def __init__(self, parts: Iterable[T]) -> None:
+        self._parts = parts
         self.fault: str | None = None
 
-    def __iter__(self) -> Iterator[Events]:
+    def __iter__(self) -> Iterator[T]:
         try:
-            yield from self._recording.packets()
+            yield from self._parts
         except DamagedRecordingError as error:
             self.fault = str(error)

@@ -1,7 +1,7 @@
 """A folder of camera images, in order, with their times.
 
-The order and the times come from `timestamps.txt` (one time in seconds a line) or from a .csv list (a column
-of file names; a further column may hold times), else from the file names, at `fps` images a second.
+The order comes from a .csv list (a column of file names), else from the file names; the times from
+`timestamps.txt` (one in seconds a line), else they are made up, at `fps` images a second.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import csv
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -21,15 +22,25 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
 
 
 def read_image(file: Path) -> NDArray[np.uint8]:
-    """An image file as uint8 (H, W), or (H, W, 3) where it has colours."""
+    """An image file as uint8 (H, W), or (H, W, 3) where it has colours; 16 bits are scaled to 8.
+
+    TraverseError where it cannot be read, or has 32 bits a pixel.
+    """
     from PIL import Image, UnidentifiedImageError
 
     try:
         with Image.open(file) as image:
-            grey = image.mode in ("1", "L", "I", "F", "I;16")
-            return np.asarray(image.convert("L" if grey else "RGB"), np.uint8)
+            if image.mode.startswith("I;16") or (image.mode == "I" and image.format == "PNG"):
+                return (np.asarray(image).astype(np.uint32) // 257).astype(np.uint8)
+            if image.mode in ("I", "F"):
+                raise TraverseError(
+                    f"{file} has 32 bits a pixel, and does not say what is white: save it with 8 or 16 bits"
+                )
+            return np.asarray(image.convert("L" if image.mode in ("1", "L") else "RGB"), np.uint8)
     except FileNotFoundError:
         raise TraverseError(f"there is no image {file}") from None
+    except Image.DecompressionBombError as error:
+        raise TraverseError(f"the image {file} is too large to be a camera's: {error}") from error
     except (UnidentifiedImageError, OSError, SyntaxError, ValueError) as error:
         raise TraverseError(f"cannot read the image {file}: {error}") from error
 
@@ -61,9 +72,21 @@ def is_frames(path: Path) -> bool:
 
 
 def image_files(folder: Path) -> list[Path]:
-    """The image files of a folder in the order of the numbers in their names."""
+    """The image files of a folder in natural order: numbers in their names count as numbers."""
     files = [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
-    return sorted(files, key=lambda file: [int(n) for n in re.findall(r"\d+", file.stem)] + [0])
+    return sorted(files, key=_natural)
+
+
+def _natural(file: Path) -> tuple[list[tuple[bool, Decimal, str]], str]:
+    """Text and numbers of a name in turn, a name that is one decimal number as that; then the whole name."""
+    if re.fullmatch(r"[0-9]+\.[0-9]+", file.stem):
+        parts = [file.stem]
+    else:
+        parts = [part for part in re.split(r"([0-9]+)", file.stem) if part]
+    told = [
+        (False, Decimal(part), "") if part[0] in "0123456789" else (True, Decimal(0), part) for part in parts
+    ]
+    return told, file.name
 
 
 def open_frames(path: str | Path, listing: str | Path | None = None, fps: float = 30.0) -> Frames:

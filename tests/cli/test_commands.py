@@ -118,6 +118,13 @@ def test_without_positions_and_by_frames(files: Path, tmp_path: Path, capsys: Ca
     assert said(capsys, *out, "--run-length", 10)["places"] == 6
     query = ("evaluate", tmp_path / "runs.evp", files / "night.aedat4", "--matcher", "best")
     assert said(capsys, *query, "-o", tmp_path / "a", "--frames", 2)["accuracy"] > 0.9
+    for flags, words in (
+        (("--frames", -3), "not -3"),
+        (("--frames", 2, "--truth", "t.npy"), "give one of them"),
+    ):
+        capsys.readouterr()
+        assert main([*map(str, (*query, "-o", tmp_path / "b", *flags))]) == 2
+        assert words in capsys.readouterr().err
     assert said(capsys, *query, "-o", tmp_path / "b")["accuracy"] > 0.9
     np.save(tmp_path / "truth.npy", np.eye(60))
     assert said(capsys, *query, "-o", tmp_path / "c", "--truth", tmp_path / "truth.npy")["recall@1"] > 0.5

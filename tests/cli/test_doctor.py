@@ -39,6 +39,16 @@ def test_json(day: Path, capsys: Capture) -> None:
     assert "GPS coverage" in {finding["name"] for finding in said["findings"]}
 
 
+def test_a_drive_of_a_data_set_with_its_own_track(day: Path, capsys: Capture) -> None:
+    write_drive(day, "night", make_drive(seed=1, windows=60))
+    assert main(["doctor", str(day), "--drive", "night", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["recording"] == f"{day}/night.aedat4"
+    assert "GPS coverage" in {finding["name"] for finding in said["findings"]}
+    assert main(["doctor", str(day)]) == 2
+    assert "say which with --drive: day, night" in capsys.readouterr().err
+
+
 def test_pictures_are_written_and_not_overwritten(day: Path, capsys: Capture) -> None:
     pytest.importorskip("matplotlib", reason="pictures need the extra 'report'")
     arguments = ["doctor", f"{day}/day.aedat4", "--report", f"{day}/day.doctor"]

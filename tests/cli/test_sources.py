@@ -141,7 +141,7 @@ def test_faults_of_folders(tmp_path: Path, capsys: Capture) -> None:
     assert "none of the datasets" in fault(capsys, *images, "--dataset", "kitty", *out)
     write_gta(tmp_path / "set")
     assert "holds no drive 'dya': it holds day" in fault(capsys, *images, "--drive", "dya", *out)
-    assert "leave these out" in fault(capsys, *images, "--drive", "day", "--size", 4, 4, *out)
+    assert "leave out --size" in fault(capsys, *images, "--drive", "day", "--size", 4, 4, *out)
     write_own(tmp_path / "set", ("day",))
     assert "may be gta or own: say which with --dataset" in fault(capsys, *images, *out)
     assert "no camera images" in fault(
@@ -152,6 +152,60 @@ def test_faults_of_folders(tmp_path: Path, capsys: Capture) -> None:
     write_utm(tmp_path / "utm", "queries", [SAN_FRANCISCO, "@nan@1.0"])
     assert "not a number" in fault(capsys, "images", tmp_path / "utm", *out)
     assert not (tmp_path / "t").exists()
+
+
+def test_a_picture_beside_a_data_set_changes_nothing(tmp_path: Path, capsys: Capture) -> None:
+    write_own(tmp_path, ("day",))
+    Image.fromarray(picture(0)).save(tmp_path / "preview.png")
+    (tmp_path / "notes.csv").mkdir()
+    assert said(capsys, "images", tmp_path, "-o", tmp_path / "t")["with_position"] > 0
+
+
+def test_a_folder_of_named_positions_keeps_them(tmp_path: Path, capsys: Capture) -> None:
+    folder = write_utm(tmp_path, "database", [SAN_FRANCISCO])
+    assert said(capsys, "images", folder, "-o", tmp_path / "t")["with_position"] == 1
+
+
+def test_a_film_that_breaks_off_keeps_its_good_part(tmp_path: Path, capsys: Capture) -> None:
+    film = tmp_path / "film"
+    film.mkdir()
+    for n in range(6):
+        Image.fromarray(picture(0.5 * n)).save(film / f"{n}.png")
+    content = (film / "4.png").read_bytes()
+    (film / "4.png").write_bytes(content[: len(content) // 2])
+    for command in (["images"], ["images", "--kind", "events"], ["simulate"]):
+        out = tmp_path / ("made.npz" if command == ["simulate"] else "made")
+        again = ["--overwrite"] if out.exists() else []
+        capsys.readouterr()
+        assert main([*command, str(film), "-o", str(out), *again, "--json"]) == 3
+        printed = capsys.readouterr()
+        assert "4.png" in json.loads(printed.out)["fault"]
+        assert len(printed.err.splitlines()) == 1
+    assert said(capsys, "info", tmp_path / "made.npz")["events"] > 0
+
+
+def test_flags_without_a_meaning_are_refused(tmp_path: Path, capsys: Capture) -> None:
+    own, frames = tmp_path / "own", tmp_path / "frames"
+    write_own(own, ("day",))
+    frames.mkdir()
+    Image.fromarray(picture(0)).save(frames / "0.png")
+    video, npz = write_video(tmp_path / "v.mp4"), own / "day.npz"
+    for source, flags, wanted in (
+        (own, ("--size", 3, 3, "--time-unit", "ns"), "leave out --size and --time-unit"),
+        (npz, ("--fps", 5, "--list", "nope.csv"), "leave out --list and --fps"),
+        (npz, ("--tone", "edges"), "--tone means nothing for the events"),
+        (video, ("--size", 10, 10), "leave out --size"),
+        (frames, ("--dt", "1/60", "--representation", "count"), "--dt and --representation means nothing"),
+        (frames, ("--size", 10, 10), "leave out --size"),
+    ):
+        assert wanted in fault(capsys, "images", source, *flags, "-o", tmp_path / "t")
+    (frames / "timestamps.txt").write_text("1.5\n")
+    assert "leave out --fps" in fault(capsys, "images", frames, "--fps", 9, "-o", tmp_path / "t")
+
+
+def test_an_unknown_video_is_told_which_are_known(tmp_path: Path, capsys: Capture) -> None:
+    (tmp_path / "film.wmv").write_bytes(b"\x30\x26\xb2\x75" * 99)
+    assert "videos are .mp4, " in fault(capsys, "images", tmp_path / "film.wmv", "-o", tmp_path / "t")
 
 
 def test_a_drive_of_another_time_does_not_overlap(tmp_path: Path, capsys: Capture) -> None:

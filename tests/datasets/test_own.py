@@ -33,6 +33,7 @@ def test_recordings_images_and_logs_of_one_name(tmp_path: Path) -> None:
     assert day.track.known.all()
     assert day.mask is not None
     assert np.argwhere(day.mask).tolist() == [[2, 1]]
+    (tmp_path / "film_hot_pixels.txt").write_text("1,2\n")  # of no use for images
     film = open_traverse(tmp_path, drive="film")
     assert film.info["input"] == "frames"
     assert film.track is not None

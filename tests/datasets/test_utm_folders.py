@@ -108,6 +108,13 @@ def test_a_local_plane_is_written_without_a_zone(tmp_path: Path) -> None:
     assert open_traverse(tmp_path).xy[:, 0].tolist() == [0, 1, -2.5]
 
 
+def test_images_of_one_time_and_place_are_all_written(tmp_path: Path) -> None:
+    drive = some_drive()
+    still = dataclasses.replace(drive, t_us=np.full(3, 7), track=Track.local(drive.t_us, [[1, 2]] * 3))
+    assert write_images(still, tmp_path / "queries") == 3
+    assert len(open_traverse(tmp_path)) == 3
+
+
 def test_what_cannot_be_written(tmp_path: Path) -> None:
     drive = some_drive()
     with pytest.raises(TrackError, match="no positions"):

@@ -37,6 +37,12 @@ def test_one_result_and_a_folder_of_results(tmp_path: Path) -> None:
     assert (found.table, found.curves, found.ablations) == (None, None, None)
 
 
+def test_results_of_one_name(tmp_path: Path) -> None:
+    for place in ("a", "results/a", "results/b"):
+        make_result().save(tmp_path / place)
+    assert sorted(look(tmp_path).results) == ["a", "b", "results/a"]
+
+
 def test_what_is_no_folder_or_holds_nothing(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     for name in ("none", "file"):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
+import io
 import json
 import re
 from pathlib import Path
@@ -13,6 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_results import make_result, write_run
+from PIL import Image
 
 from evplace.report._found import Curve, Found, PaperCurve, Sheet, look
 from evplace.report._html import Html, join, tag
@@ -88,6 +91,40 @@ def test_nothing_is_loaded_from_elsewhere(run: Found) -> None:
     assert "default-src 'none'" in text
     assert not re.findall(r"<(?:link|iframe|object|base)\b", text)
     assert all(source.startswith("data:image/png") for source in re.findall(r'src="([^"]*)"', text))
+
+
+def test_real_sets_have_a_section_of_their_own(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run", results=0)
+    rows = [
+        {
+            "database": "Summer", "query": name, "sensor": name, "input": "images", "matcher": matcher,
+            "rule": rule, "mean": 77.25, "chance": 1.0, "paper": None,
+        }
+        for name, rule in (("Nordland", "within 0"), ("Nordland", "within 2"), ("Example", "given"))
+        for matcher in ("best", "SeqSLAM")
+    ]  # fmt: skip
+    sheet = {"format": "evplace-table-1", "title": "Real drives: accuracy in %", "rows": rows}
+    (run / "real.json").write_text(json.dumps(sheet))
+    text = page(look(run))
+    section = text[text.index('<section id="real"') :].partition("</section>")[0]
+    assert text.index('<section id="table"') < text.index('<section id="real"')
+    for words in ("Real drives: accuracy in %", ">within 0<", ">within 2<", ">given<", "Nordland", "77.2"):
+        assert words in section
+    assert "paper" not in section
+    assert section.count('scope="colgroup"') == 6
+    (run / "table2.json").unlink()
+    assert "77.2 %" in page(look(run))
+
+
+@pytest.mark.parametrize(("kind", "turned"), [("events", True), ("frames", False)])
+def test_only_event_images_become_ink_on_paper(kind: str, turned: bool) -> None:
+    result = make_result()
+    assert result.samples is not None
+    dark = dataclasses.replace(result.samples, images=np.zeros_like(result.samples.images))
+    told = dataclasses.replace(result, settings={"map": {"input": kind}}, samples=dark)
+    ((_, sources), *_) = sample_images({"r": told})["r"]
+    picture = Image.open(io.BytesIO(base64.b64decode(sources[0].partition(",")[2])))
+    assert np.asarray(picture.convert("L"))[0, 0] == (255 if turned else 0)
 
 
 def test_names_cannot_become_markup(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -27,6 +28,26 @@ def test_a_page_and_its_plots(tmp_path: Path) -> None:
     with pytest.raises(OutputError, match="exists"):
         report(run)
     report(run, overwrite=True)
+
+
+def test_no_plot_is_replaced_unasked(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="plots need the extra 'report'")
+    run = write_run(tmp_path / "run")
+    (run / "report-route.png").write_bytes(b"mine")
+    with pytest.raises(OutputError, match=r"report-route\.png exists"):
+        report(run)
+    assert (run / "report-route.png").read_bytes() == b"mine"
+    assert not (run / "report-accuracy.png").exists()
+    assert not (run / "report.html").exists()
+
+
+def test_panels_that_are_named_alike_keep_their_own_plots(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="plots need the extra 'report'")
+    panels = [{"panel": name, "points": [[0.5, 0.5, 0.5]]} for name in ("day/night", "day night")]
+    sheet = {"format": "evplace-curves-1", "curves": panels}
+    (tmp_path / "figure5.json").write_text(json.dumps(sheet))
+    names = ["report-curves-day-night.png", "report-curves-day-night-2.png"]
+    assert [plot.name for plot in report(tmp_path).plots] == names
 
 
 def test_one_result_elsewhere(tmp_path: Path) -> None:

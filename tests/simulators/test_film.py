@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from evplace.errors import InputError, MissingExtraError
+from evplace.errors import DamagedRecordingError, InputError, MissingExtraError
 from evplace.events import Events
 from evplace.simulators import frames as films
 from evplace.simulators.esim import simulate
@@ -30,7 +31,9 @@ def write_images(folder: Path, count: int, times: list[float] | None = None) -> 
 
 def write_video(path: Path, count: int) -> Path:
     av = pytest.importorskip("av")
-    with av.open(str(path), "w") as container:
+    with av.open(
+        str(path), "w", options={"movflags": "faststart"} if path.suffix == ".mp4" else {}
+    ) as container:
         stream = container.add_stream("mpeg4", rate=50)
         stream.width, stream.height, stream.pix_fmt, stream.bit_rate = 64, 48, "yuv420p", 4_000_000
         for k in range(count):
@@ -132,6 +135,51 @@ def test_a_video_that_cannot_be_decoded(tmp_path: Path) -> None:
     (tmp_path / "noise.mp4").write_bytes(bytes(range(256)) * 40)
     with pytest.raises(InputError, match="cannot decode the video"):
         open_film(tmp_path / "noise.mp4")
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
+def test_a_video_that_was_cut_off(tmp_path: Path, suffix: str) -> None:
+    whole = write_video(tmp_path / f"film.{suffix}", 60)
+    assert len(list(open_film(whole))) == 60
+    cut = tmp_path / f"cut.{suffix}"
+    cut.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    frames = iter(open_film(cut))
+    good = []
+    with pytest.raises(DamagedRecordingError, match=r"header states 1\.200 s: it was cut off"):
+        good.extend(frames)
+    assert 10 < len(good) < 50
+
+
+def test_a_broken_image_ends_the_good_part(tmp_path: Path) -> None:
+    film = open_film(write_images(tmp_path / "film", 4))
+    (tmp_path / "film" / "frame_0002.png").write_bytes(b"no image")
+    good = []
+    with pytest.raises(DamagedRecordingError, match=r"frame_0002\.png"):
+        good.extend(film.images())
+    assert len(good) == 2
+
+
+def test_frames_of_one_time_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    film = open_film(write_video(tmp_path / "film.mp4", 6))
+    monkeypatch.setattr(films, "round", lambda value: min(round(value), 40_000), raising=False)
+    with pytest.raises(
+        DamagedRecordingError, match=r"at 0\.040000 s does not come after the one at 0\.040000 s"
+    ):
+        list(film)
+
+
+def test_a_video_is_turned_upright(tmp_path: Path) -> None:
+    video = write_video(tmp_path / "film.mp4", 2)
+    (_, lying), *_ = open_film(video)
+    content = bytearray(video.read_bytes())
+    at = content.index(b"tkhd") + 44
+    quarter_clockwise = (0, 1 << 16, 0, -1 << 16, 0, 0, 48 << 16, 0, 1 << 30)
+    content[at : at + 36] = struct.pack(">9i", *quarter_clockwise)
+    video.write_bytes(content)
+    film = open_film(video)
+    assert film.size == (48, 64)
+    (_, upright), *_ = film
+    np.testing.assert_array_equal(upright, np.rot90(lying, -1))
 
 
 def test_a_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

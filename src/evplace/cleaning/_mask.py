@@ -44,9 +44,9 @@ def pixel_mask(
 def read_mask(given: MaskSource, size: Size) -> Mask:
     """(H, W) True at the pixels that `given` names, for a sensor of `size` (width, height).
 
-    A text file has a line `x,y` a pixel (blanks do as well, # starts a remark); a .npy file, or an array,
-    is a mask (H, W) of booleans or the pixels (n, 2) as whole numbers. RecordingError where it is neither or
-    does not fit the sensor.
+    A text file has a line `x,y` a pixel (blanks do as well, # starts a remark, a header x,y may stand first);
+    a .npy file, or an array, is a mask (H, W) of booleans or the pixels (n, 2) as whole numbers.
+    RecordingError where it is neither or does not fit the sensor.
     """
     name = "the mask" if isinstance(given, np.ndarray) else f"the mask {given}"
     values = given if isinstance(given, np.ndarray) else _loaded(Path(given), name)
@@ -87,7 +87,7 @@ def _pixels(path: Path, name: str) -> NDArray[np.int64]:
         pixel = re.fullmatch(r"(\d{1,5})[\s,;]+(\d{1,5})", text)
         if pixel is not None:
             found.append((int(pixel[1]), int(pixel[2])))
-        elif text:
+        elif text and not (re.fullmatch(r"x[\s,;]+y", text.lower()) and not found):
             raise RecordingError(f"{name}: line {number} is no pixel: write x,y")
     return np.array(found, np.int64).reshape(-1, 2)
 

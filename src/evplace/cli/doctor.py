@@ -5,6 +5,7 @@ Examples:
   evplace doctor night.aedat4 --track night.nmea --dt 1/60      also the track and the two clocks
   evplace doctor night.aedat4 --report night.doctor             a folder of pictures and findings.json
   evplace doctor drive.mp4                                      are there enough frames to simulate from?
+  evplace doctor brisbane/ --drive sunset1                      with its GPS
   evplace doctor night.aedat4 --json                            one object: facts, findings, fault
 
 States: bad costs results; look may; unknown cannot be told from this recording; good needs nothing. Advice
@@ -35,15 +36,19 @@ class Args(TrackFlags):
     """Flags of `evplace doctor`."""
 
     recording: tyro.conf.Positional[Path]
-    """An event recording, a video, or a folder of images."""
+    """An event recording, a video, a folder of images, or a data set's folder."""
     dt: str = "1/30"
     """Length of a window in seconds, as a fraction or a decimal."""
     size: tuple[int, int] | None = None
     """Width and height of the sensor in pixels, where the file does not say or says it wrongly."""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
     """Unit of the times, where the file does not say."""
-    fps: float = 30.0
-    """For a folder of images without timestamps.txt: images a second."""
+    fps: float | None = None
+    """For a folder of images without timestamps.txt: images a second, 30 unless given."""
+    drive: str | None = None
+    """For a data set: which drive."""
+    dataset: str | None = None
+    """For a data set that is not recognised by its layout: its name."""
     report: Path | None = None
     """Also write a folder of pictures and findings.json."""
     overwrite: bool = False
@@ -56,7 +61,16 @@ def run(args: Args) -> int:
     """Examine, print, and draw if asked."""
     if args.report is not None:
         check_drawing(args.report, args.overwrite)
-    found = examine(args.recording, args.opened_track(), args.dt, args.size, args.time_unit, args.fps)
+    found = examine(
+        args.recording,
+        args.opened_track(),
+        args.dt,
+        args.size,
+        args.time_unit,
+        args.fps,
+        args.drive,
+        args.dataset,
+    )
     if args.report is not None:
         draw(found, args.report, args.overwrite)
     if args.json:

@@ -22,7 +22,7 @@ from evplace.capture import open_traverse
 from evplace.charts import curve_chart
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
 from evplace.cli._track import TrackFlags
-from evplace.errors import MissingExtraError
+from evplace.errors import MissingExtraError, SettingsError
 from evplace.evaluation import MARK
 from evplace.images import ImageSettings
 from evplace.localizer import Localizer
@@ -81,6 +81,10 @@ class Args(TrackFlags):
 def run(args: Args) -> int:
     """Localise the drive, measure, save and print."""
     check_new_folder(args.out, args.overwrite, MARK)
+    if args.truth is not None and args.frames is not None:
+        raise SettingsError("--truth and --frames both say what is right: give one of them")
+    if args.frames is not None and args.frames < 0:
+        raise SettingsError(f"--frames is how many items off an answer may be, 0 or more, not {args.frames}")
     place_map = PlaceMap.load(args.map)
     values = settings.from_pairs(args.set)
     where = Localizer(place_map, args.matcher, args.preset, args.mask, **values)

@@ -21,10 +21,12 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import tyro
 
-from evplace.capture import open_source, record
+from evplace.capture import is_kept, open_source, record
 from evplace.cleaning import CleaningSettings
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
 from evplace.cli._track import TrackFlags
+from evplace.datasets import Drive
+from evplace.errors import SettingsError
 from evplace.images import ImageSettings
 from evplace.sheets import contact_sheet
 from evplace.spacing import SpacingSettings
@@ -32,6 +34,10 @@ from evplace.storage import check_new_file
 from evplace.traverse import Traverse, TraverseWriter, new_traverse
 from evplace.windows import WindowSettings
 
+OF_EVENTS = {"representation", "blur", "blur_last", "saturation", "tau_ms", "bins"}
+"""Settings of images that camera images do not take."""
+OF_FRAMES = {"tone"}
+"""Those that only camera images take."""
 S = TypeVar("S", WindowSettings, ImageSettings)
 
 
@@ -83,7 +89,8 @@ def run(args: Args) -> int:
         fault = _record(args, writer)
     traverse = Traverse.load(args.out)
     if args.sheet is not None:
-        contact_sheet(traverse.images, args.sheet, args.overwrite)
+        are_events = traverse.info.get("input") == "events"
+        contact_sheet(traverse.images, args.sheet, args.overwrite, events=are_events)
     placed = int(traverse.track.known.sum()) if traverse.track is not None else 0
     facts = {
         "images": len(traverse),
@@ -108,7 +115,9 @@ def run(args: Args) -> int:
 
 def _record(args: Args, writer: TraverseWriter) -> str | None:
     """Write the images; returns what broke off, if anything."""
-    drive = open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, args.fps)
+    fps = args.fps if "fps" in args.given else None
+    drive = open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps)
+    _check_meant(args, drive)
     windows, images = _over(drive.windows, args.windows, args), _over(drive.images, args.images, args)
     with remarks():
         return record(
@@ -122,6 +131,17 @@ def _record(args: Args, writer: TraverseWriter) -> str | None:
             args.mask,
             args.kind,
         )
+
+
+def _check_meant(args: Args, drive: Drive) -> None:
+    """SettingsError where the user named a flag that means nothing for camera images, or for events."""
+    kept = is_kept(drive, args.kind)
+    windows = {field.name for field in dataclasses.fields(WindowSettings)}
+    idle = [name for name in args.given if name in (windows | OF_EVENTS if kept else OF_FRAMES)]
+    if idle:
+        flags = " and ".join(f"--{name.replace('_', '-')}" for name in dict.fromkeys(idle))
+        what, hint = ("camera images", ", or add --kind events") if kept else ("events", "")
+        raise SettingsError(f"{flags} means nothing for the {what} of {args.source}: leave it out{hint}")
 
 
 def _over(own: S, said: S, args: Args) -> S:

@@ -11,6 +11,7 @@ they do not.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -18,7 +19,9 @@ from typing import Annotated, Literal
 import tyro
 
 from evplace import settings as settings_room
-from evplace.cli._output import print_facts, print_json, remarks
+from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json, remarks
+from evplace.errors import DamagedRecordingError
+from evplace.events import Events
 from evplace.simulators.esim import PRESETS, SensorSettings, simulate
 from evplace.simulators.frames import open_film
 from evplace.writers import write_recording
@@ -51,17 +54,38 @@ def run(args: Args) -> int:
     values = settings_room.from_pairs(args.set)
     sensor = settings_room.make(SensorSettings, values, PRESETS[args.preset])
     film = open_film(args.film, args.fps)
+    packets = _Counted(simulate(film, film.size, sensor, args.seed))
+    fault = None
     with remarks():
-        packets = simulate(film, film.size, sensor, args.seed)
-        events = write_recording(args.out, packets, film.size, overwrite=args.overwrite)
+        try:
+            write_recording(args.out, packets, film.size, overwrite=args.overwrite)
+        except DamagedRecordingError as error:
+            fault = str(error)
+    events = packets.events
     facts = {
         "events": events,
         "width": film.size[0],
         "height": film.size[1],
         "sensor": settings_room.to_dict(sensor),
+        "fault": fault,
     }
     if args.json:
         print_json(facts)
     else:
         print_facts(str(args.out), {"events": events, "sensor": f"{film.size[0]} x {film.size[1]}"})
-    return 0
+    if fault is not None:
+        note(f"{fault}; the images before it were simulated")
+    return USED_GOOD_PART if fault is not None else 0
+
+
+class _Counted:
+    """Packets, counted on their way."""
+
+    def __init__(self, packets: Iterable[Events]) -> None:
+        self._packets = packets
+        self.events = 0
+
+    def __iter__(self) -> Iterator[Events]:
+        for packet in self._packets:
+            self.events += len(packet)
+            yield packet

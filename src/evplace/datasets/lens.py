@@ -35,8 +35,12 @@ def recognises(folder: Path) -> bool:
 
 
 def drives(folder: Path) -> list[str]:
-    """The drives that a list names."""
-    return sorted(file.stem for file in folder.glob("*.csv") if _is_listing(file))
+    """The drives that a list names, and that have a folder."""
+    return sorted(
+        file.stem
+        for file in folder.glob("*.csv")
+        if file.is_file() and _is_listing(file) and any(folder.glob(f"*/*/{file.stem}"))
+    )
 
 
 def open_drive(folder: Path, name: str) -> Drive:

@@ -4,7 +4,7 @@ Citation, licence, address: its owner's. Layout:
 
     day.aedat4       any recording that is read here, or a folder of images with timestamps.txt (seconds)
     day.nmea         the GPS log of the same name: .nmea, .gpx or .csv, on the same clock
-    day_hot_pixels.txt      lines of x,y, where there is one
+    day_hot_pixels.txt      lines of x,y, where there is one; passed over beside a folder of images
 
 Images are kept as camera images unless events are asked for.
 """
@@ -15,7 +15,7 @@ from pathlib import Path
 
 from evplace.datasets import Drive
 from evplace.errors import DatasetError, TraverseError
-from evplace.frames import is_frames, open_frames
+from evplace.frames import SUFFIXES, is_frames, open_frames
 from evplace.readers import is_recording, open_recording
 from evplace.simulators.frames import Film, film_of
 from evplace.tracks import open_track
@@ -27,7 +27,8 @@ HOT = "_hot_pixels.txt"
 
 def recognises(folder: Path) -> bool:
     """Whether a recording or a folder of images has a log of the same name."""
-    return any(_log(folder, name) is not None for name in drives(folder))
+    # The log is asked for first: to look into each of thousands of images takes long.
+    return any(_log(folder, _name(path)) is not None and _is_source(path) for path in folder.iterdir())
 
 
 def drives(folder: Path) -> list[str]:
@@ -45,9 +46,10 @@ def open_drive(folder: Path, name: str) -> Drive:
     if log is None:
         wanted = ", ".join(f"{name}{suffix}" for suffix in LOGS)
         raise DatasetError(f"{sources[0]} has no GPS log: put one of {wanted} beside it")
+    if is_frames(sources[0]):
+        return Drive(_film(sources[0]), open_track(log))
     hot = folder / f"{name}{HOT}"
-    source = _film(sources[0]) if is_frames(sources[0]) else open_recording(sources[0])
-    return Drive(source, open_track(log), hot if hot.exists() else None)
+    return Drive(open_recording(sources[0]), open_track(log), hot if hot.exists() else None)
 
 
 def _film(folder: Path) -> Film:
@@ -68,7 +70,7 @@ def _is_source(path: Path) -> bool:
         return False
     if path.is_dir():
         return is_frames(path) or is_recording(path)
-    return path.suffix.lower() not in LOGS and is_recording(path)
+    return path.suffix.lower() not in (*LOGS, *SUFFIXES) and is_recording(path)
 
 
 def _log(folder: Path, name: str) -> Path | None:

@@ -18,6 +18,7 @@ times, else the names give the order, at one image a second. Images of several s
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -57,18 +58,19 @@ class _Place(NamedTuple):
 
 
 def recognises(folder: Path) -> bool:
-    """Whether a folder `database` or `queries` holds images with @ in their names."""
+    """Whether a folder `database` or `queries`, or the folder itself, holds images with @ in their names."""
     return bool(drives(folder))
 
 
 def drives(folder: Path) -> list[str]:
-    """Which of the two folders are there."""
-    return [name for name in NAMES if _images(folder, name)]
+    """Which of the two folders are there; the folder itself where it is such a one."""
+    found = [name for name in NAMES if _images(folder, name)]
+    return found or ([folder.resolve().name] if _own_images(folder) else [])
 
 
 def open_drive(folder: Path, name: str) -> Drive:
     """The images in order, and where they were taken."""
-    files = _images(folder, name)
+    files = _images(folder, name) or _own_images(folder)
     places = _in_order([_place(file) for file in files])
     timed = places[0].t_us is not None
     times = [place.t_us for place in places] if timed else [n * 1_000_000 for n in range(len(places))]
@@ -96,9 +98,13 @@ def write_images(traverse: Traverse, folder: str | Path, overwrite: bool = False
             f"images of {traverse.images.shape[-1]} channels cannot be written as .jpg: make them grey or RGB"
         )
     with new_folder(folder, overwrite, MARK) as made:
+        names: Counter[str] = Counter()
         for n in np.flatnonzero(track.known):
             image = Image.fromarray(np.ascontiguousarray(traverse.images[n]))
             name = _image_name(track, int(n), int(traverse.t_us[n]))
+            names[name] += 1
+            if names[name] > 1:  # of one place and time: the note tells them apart
+                name = name.replace("us@.jpg", f"us-{names[name]}@.jpg")
             image.save(made / name, quality=_QUALITY, subsampling=0)
     return int(track.known.sum())
 
@@ -107,11 +113,16 @@ def _images(folder: Path, name: str) -> list[Path]:
     """The images of the first split that has them."""
     for split in SPLITS:
         place = folder / split / name
-        if place.is_dir():
-            files = [file for file in place.rglob("*") if file.suffix.lower() in SUFFIXES]
-            if files and any(file.name.startswith("@") for file in files):
-                return sorted(files)
+        files = [file for file in place.rglob("*") if file.suffix.lower() in SUFFIXES]
+        if any(file.name.startswith("@") for file in files):
+            return sorted(files)
     return []
+
+
+def _own_images(folder: Path) -> list[Path]:
+    """The images of a folder that is itself such a one: its `database`, say."""
+    files = [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
+    return sorted(files) if any(file.name.startswith("@") for file in files) else []
 
 
 def _place(file: Path) -> _Place:

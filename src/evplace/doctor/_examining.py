@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from evplace import plugs
+from evplace.capture import open_source
 from evplace.doctor._outcome import STATES, Examination, Finding, Outcome
 from evplace.doctor._subject import Subject
 from evplace.errors import DamagedRecordingError, InputError, TrackError
 from evplace.events import Events, Size
-from evplace.frames import check_rate, is_frames
-from evplace.readers import open_recording
-from evplace.simulators.frames import VIDEOS, Film, open_film
+from evplace.simulators.frames import Film
 from evplace.simulators.motion import Frame
 from evplace.tracks import Track, open_track
 from evplace.windows import WindowSettings
@@ -36,21 +35,23 @@ def examine(
     dt: str = "1/30",
     size: Size | None = None,
     time_unit: str | None = None,
-    fps: float = 30.0,
+    fps: float | None = None,
+    drive: str | None = None,
+    dataset: str | None = None,
 ) -> Examination:
-    """Examine an event recording, a video or a folder of images, and its track.
+    """Examine an event recording, a video, a folder of images or a drive of a data set, and its track.
 
-    `dt` is the length of a window in seconds, as of `WindowSettings`; `size` and `time_unit` are for
-    recordings that do not say (see `open_recording`), `fps` for folders of images without times. A damaged
-    recording's good part is examined. InputError where something cannot be read, SettingsError for a `dt`
-    of no length or an `fps` that cannot be.
+    `dt` is the length of a window in seconds, as of `WindowSettings`; the others are as in `open_source`. A
+    data set's drive has its own track, unless one is given. A damaged recording's good part is examined.
+    InputError where something cannot be read, SettingsError for a `dt` of no length, an `fps` that cannot be
+    or what has no meaning.
     """
     windows = WindowSettings(dt)
-    check_rate(fps)
-    positions = _known(open_track(track) if isinstance(track, str | Path) else track)
-    if _is_film(Path(path)):
-        return _film(open_film(path, fps), windows, positions)
-    recording = open_recording(path, size, time_unit=time_unit)
+    given = open_track(track) if isinstance(track, str | Path) else track
+    opened = open_source(path, size, time_unit, drive, dataset, fps=fps)
+    positions, recording = _known(opened.track if given is None else given), opened.source
+    if isinstance(recording, Film):
+        return _film(recording, windows, positions)
     return _examined(Subject(recording.path, "events", recording.size, windows, positions, recording))
 
 
@@ -62,12 +63,6 @@ def _known(track: Track | None) -> Track | None:
         raise TrackError("no fix of the track has a position: give the log of this drive")
     per_fix = ("t_us", "latitude", "longitude", "easting", "northing", "heading_deg")
     return replace(track, **{name: getattr(track, name)[track.known] for name in per_fix})
-
-
-def _is_film(path: Path) -> bool:
-    if path.is_dir():
-        return is_frames(path) or is_frames(path / "images")
-    return path.suffix.lower() in VIDEOS
 
 
 def _film(film: Film, windows: WindowSettings, track: Track | None) -> Examination:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from evplace.errors import MissingExtraError
+from evplace.errors import MissingExtraError, OutputError
 from evplace.report._found import look
 from evplace.report._page import page
 from evplace.report._plots import plots
@@ -30,18 +30,22 @@ def report(folder: str | Path, out: str | Path | None = None, overwrite: bool = 
     """Write a page of all that `folder` holds, by default as report.html in it.
 
     `folder` is a result that `evplace evaluate` wrote, a folder of results, or one that also holds
-    table2.json, figure5.json or ablations.json. Without matplotlib there are no plots beside the page. Raises
-    InputError where there is nothing to show or something is damaged, OutputError where the page cannot be
-    written.
+    table2.json, real.json, figure5.json or ablations.json. Without matplotlib there are no plots beside the
+    page. Raises InputError where there is nothing to show or something is damaged, OutputError where the page
+    or a plot exists (unless `overwrite`) or cannot be written.
     """
     found = look(Path(folder))
     target = Path(folder) / "report.html" if out is None else Path(out)
-    made: list[Path] = []
     remark = None
+    try:
+        planned = plots(found, target)
+    except MissingExtraError as error:
+        planned, remark = {}, f"No plots beside this page: {error}"
+    there = next((plot for plot in planned if plot.exists()), None)
+    if there is not None and not overwrite:
+        raise OutputError(f"{there} exists: name another page, remove it, or add --overwrite")
     with new_file(target, overwrite) as partial:
-        try:
-            made = plots(found, target)
-        except MissingExtraError as error:
-            remark = f"No plots beside this page: {error}"
         partial.write_text(page(found, remark), "utf-8")
-    return Written(target, made, remark)
+        for plot, draw in planned.items():
+            draw(plot)
+    return Written(target, list(planned), remark)

@@ -107,7 +107,9 @@ class Found:
     ablations: Sheet | None
     """Ablation each."""
     results: dict[str, Result]
-    """Name -> result, by name."""
+    """Name -> result, by name; below the folder as results/a where there is also an a."""
+    real: Sheet | None = None
+    """TableRow each, of real sets."""
 
 
 def look(folder: Path) -> Found:
@@ -120,8 +122,9 @@ def look(folder: Path) -> Found:
         _sheet(folder / "figure5.json", "evplace-curves-1", curves=Curve, paper=PaperCurve),
         _sheet(folder / "ablations.json", "evplace-ablations-1", rows=Ablation),
         {name: Result.load(path) for name, path in _result_folders(folder).items()},
+        _sheet(folder / "real.json", "evplace-table-1", rows=TableRow),
     )
-    if not (found.table or found.curves or found.ablations or found.results):
+    if not (found.table or found.real or found.curves or found.ablations or found.results):
         raise InputError(
             f"{folder} holds nothing to report on: give a result that `evplace evaluate` wrote, or a folder "
             "of such results"
@@ -133,8 +136,13 @@ def _result_folders(folder: Path) -> dict[str, Path]:
     """The folder itself where it is a result, else those in it and in its results/; in natural order."""
     if _is_result(folder):
         return {folder.resolve().name: folder}
+    outer = {path.name for path in folder.iterdir() if _is_result(path)}
     inner = [*folder.iterdir(), *(folder / "results").glob("*")]
-    return {path.name: path for path in sorted(filter(_is_result, inner), key=_natural)}
+    found = {}
+    for path in sorted(filter(_is_result, inner), key=_natural):
+        taken = path.parent != folder and path.name in outer
+        found[f"results/{path.name}" if taken else path.name] = path
+    return found
 
 
 def _is_result(folder: Path) -> bool:

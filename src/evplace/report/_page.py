@@ -46,17 +46,22 @@ def page(found: Found, remark: str | None = None) -> str:
 
 def _sections(found: Found, drawn: list[Panel]) -> Html:
     table, changes, results = found.table, found.ablations, found.results
-    title = str(table.said.get("title") or "Accuracy") if table else ""
     return join(
-        _section("table", title, _tables.table2(table.rows)) if table else None,
+        _accuracies("table", table, "Accuracy") if table else None,
+        _accuracies("real", found.real, "Accuracy on real sets") if found.real else None,
         _section("curves", "Precision and recall", tag("div", id="panels")) if drawn else None,
         _section("ablations", "Ablations", _tables.ablations(changes.rows)) if changes else None,
         _section("look", "A closer look", tag("div", id="look-at")) if results else None,
         _section("results", "All results, in %", _tables.overview(results)) if len(results) > 1 else None,
         _section("making", "How this was made", *_making(found))
-        if table or found.curves or changes
+        if table or found.real or found.curves or changes
         else None,
     )
+
+
+def _accuracies(name: str, sheet: Sheet, otherwise: str) -> Html:
+    title = str(sheet.said.get("title") or otherwise)
+    return _section(name, title, _tables.accuracies(sheet.rows))
 
 
 def _section(name: str, title: str, *inside: str) -> Html:
@@ -66,7 +71,12 @@ def _section(name: str, title: str, *inside: str) -> Html:
 
 
 def _making(found: Found) -> list[Html]:
-    sheets = {"Table": found.table, "Curves": found.curves, "Ablations": found.ablations}
+    sheets = {
+        "Table": found.table,
+        "Real sets": found.real,
+        "Curves": found.curves,
+        "Ablations": found.ablations,
+    }
     return [_details(name, sheet) for name, sheet in sheets.items() if sheet is not None]
 
 

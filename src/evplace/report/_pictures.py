@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +36,15 @@ def _of(result: Result) -> Shown:
     samples = result.samples
     assert samples is not None
     true_item = np.full(len(result.judged), 0) if result.true_item is None else result.true_item
+    events = _are_events(result.settings)
     shown = []
     for query, images in zip(samples.query.tolist(), samples.images, strict=True):
         there = (True, result.answers.item[query] >= 0, true_item[query] >= 0)
         shown.append(
-            (query, [_source(image) if some else "" for image, some in zip(images, there, strict=True)])
+            (
+                query,
+                [_source(image, events) if some else "" for image, some in zip(images, there, strict=True)],
+            )
         )
     return shown
 
@@ -48,11 +53,17 @@ def _evenly(samples: Shown, many: int) -> Shown:
     return [samples[at] for at in np.linspace(0, len(samples) - 1, many).astype(int)] if samples else []
 
 
-def _source(image: NDArray[np.uint8]) -> str:
+def _are_events(settings: Mapping[str, Any]) -> bool:
+    """Whether the map was made of event images."""
+    of_map = settings.get("map")
+    return isinstance(of_map, Mapping) and of_map.get("input") == "events"
+
+
+def _source(image: NDArray[np.uint8], events: bool) -> str:
     """An image (h, w) or (h, w, C) as the address of a PNG that holds itself."""
     from PIL import Image
 
-    shown = as_shown(image)
+    shown = as_shown(image, events)
     grey = bool(np.all(shown == shown[..., :1]))
     picture = Image.fromarray(shown[..., 0] if grey else shown)
     file = io.BytesIO()

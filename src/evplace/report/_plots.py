@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,30 +15,32 @@ from evplace.report._found import Found, TableRow
 from evplace.report._panels import Panel, panels, result_line
 
 
-def plots(found: Found, page: Path) -> list[Path]:
-    """Draw what is there beside `page`, named after it; the route and the items of the first result.
+def plots(found: Found, page: Path) -> dict[Path, Callable[[Path], None]]:
+    """File -> what draws it: beside `page`, named after it; the route and the items are the first result's.
 
     Raises MissingExtraError without matplotlib.
     """
-    made = []
+    charts.check_there()
+    made: dict[Path, Callable[[Path], None]] = {}
 
-    def named(what: str) -> Path:
-        made.append(page.with_name(f"{page.stem}-{what}.png"))
-        return made[-1]
+    def add(what: str, draw: Callable[[Path], None]) -> None:
+        ends = itertools.chain([""], (f"-{n}" for n in itertools.count(2)))  # of panels named alike
+        files = (page.with_name(f"{page.stem}-{what}{end}.png") for end in ends)
+        made[next(file for file in files if file not in made)] = draw
 
     if found.table is not None and found.table.rows:
-        charts.bars_chart(_bars(found.table.rows), named("accuracy"))
+        add("accuracy", partial(charts.bars_chart, _bars(found.table.rows)))
     drawn = panels(found)
     for panel in drawn:
         what = f"curves-{_slug(panel.title)}" if found.curves is not None else "curves"
-        charts.curves_chart(panel.title, _curves(panel), named(what))
+        add(what, partial(charts.curves_chart, panel.title, _curves(panel)))
     if found.results:
         name, result = next(iter(found.results.items()))
         if not drawn:
-            charts.curves_chart("", _curves(Panel("", [result_line(name, result)])), named("curves"))
-        charts.confusion_chart(result, named("items"))
+            add("curves", partial(charts.curves_chart, "", _curves(Panel("", [result_line(name, result)]))))
+        add("items", partial(charts.confusion_chart, result))
         if result.query_xy is not None:
-            charts.route_chart(result, named("route"))
+            add("route", partial(charts.route_chart, result))
     return made
 
 

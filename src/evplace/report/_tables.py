@@ -31,8 +31,8 @@ def headline(found: Found) -> Html:
     return tag("div", *(_tile(*one) for one in _headline_figures(found)), class_="tiles")
 
 
-def table2(rows: Sequence[TableRow]) -> Html:
-    """The paper's Table 2: a block for each matcher, both rules, of which one is shown."""
+def accuracies(rows: Sequence[TableRow]) -> Html:
+    """A table as the paper's Table 2: a block for each matcher, all rules, of which one is shown."""
     rules = list(dict.fromkeys(row.rule for row in rows))
     blocks = []
     for number, rule in enumerate(rules):
@@ -111,6 +111,8 @@ def _headline_figures(found: Found) -> list[tuple[str, str, str]]:
     """(value, what it is, remark) each."""
     if found.table is not None and found.table.rows:
         return _of_table(found.table.rows)
+    if found.real is not None and found.real.rows:
+        return _of_table(found.real.rows)
     if found.results:
         return _of_results(found.results)
     if found.ablations is not None:
@@ -179,10 +181,13 @@ def _legend(rows: Sequence[TableRow]) -> Html:
     seeds = sorted({int(row.seeds) for row in rows if row.seeds is not None})
     counted = f" over {seeds[0]} seeds" if len(seeds) == 1 and seeds[0] > 1 else " over seeds"
     spread = f", ± their spread{counted}" if any(row.spread is not None for row in rows) else ""
+    paper = "; beside it the paper's figure" if any(row.paper is not None for row in rows) else ""
+    below = ""
+    if any(row.seen is not None or row.rejected is not None for row in rows):
+        below = " Below: accuracy on the queries that the map has seen, and the share rejected as new."
     return tag(
         "p",
-        f"Accuracy in %{spread}; beside it the paper's figure. Below: accuracy on the queries that the map "
-        "has seen, and the share rejected as not seen before.",
+        f"Accuracy in %{spread}{paper}.{below}",
         class_="note",
     )
 
@@ -230,7 +235,8 @@ def _block_head(
 
 
 def _kind(row: TableRow) -> tuple[str, str]:
-    return row.input, row.sensor
+    """Input and sensor, without a name for the sensor where each set has its own."""
+    return row.input, "" if row.sensor == row.query else row.sensor
 
 
 def _cells(row: TableRow | None, with_paper: bool) -> Html:

@@ -13,12 +13,15 @@ const ERROR_WORDS = ["below 10 m", "10 to 20 m", "20 to 40 m", "40 to 80 m", "80
 const SAMPLE_WORDS = ["query", "matched", "nearest right"];
 
 function ruleSwitch() {
-  const buttons = [...document.querySelectorAll("button[data-shows]")];
-  const blocks = [...document.querySelectorAll("[data-rule]")];
-  for (const button of buttons) {
+  for (const button of document.querySelectorAll("button[data-shows]")) {
+    const section = button.closest("section"); // each table has rules of its own
     button.addEventListener("click", () => {
-      for (const one of buttons) one.setAttribute("aria-pressed", String(one === button));
-      for (const block of blocks) block.hidden = block.dataset.rule !== button.dataset.shows;
+      for (const one of section.querySelectorAll("button[data-shows]")) {
+        one.setAttribute("aria-pressed", String(one === button));
+      }
+      for (const block of section.querySelectorAll("[data-rule]")) {
+        block.hidden = block.dataset.rule !== button.dataset.shows;
+      }
     });
   }
 }
