@@ -70,7 +70,7 @@ def test_scorers_and_their_settings_are_checked(day: Traverse, places: PlaceGrid
     assert checked_settings("ncc", {"sigma": 1})["sigma"] == 1.0
     with pytest.raises(SettingsError, match="did you mean 'sigma'"):
         checked_settings("ncc", {"sigmas": 1})
-    with pytest.raises(SettingsError, match="known are ncc, network, sad"):
+    with pytest.raises(SettingsError, match="known are cosine, ncc, network"):
         checked_settings("nearest", {})
     known = train(day, places, scorer="sad")
     unknown = dataclasses.replace(known, scorer="nearest")
