@@ -99,7 +99,8 @@ def test_what_cannot_be_examined(tmp_path: Path) -> None:
     recording, track = write_drive(tmp_path, "day", make_drive(windows=5))
     with pytest.raises(SettingsError, match="dt"):
         examine(recording, dt="0")
-    for path in (tmp_path / "none.aedat4", track, tmp_path / "none.mp4", tmp_path):
+    (tmp_path / "empty").mkdir()
+    for path in (tmp_path / "none.aedat4", track, tmp_path / "none.mp4", tmp_path / "empty"):
         with pytest.raises(InputError):
             examine(path)
     with pytest.raises(InputError, match=r"none\.nmea"):
