@@ -98,7 +98,7 @@ def bars_chart(groups: Mapping[str, Sequence[Mapping[str, Any]]], path: str | Pa
         all_axes[0, 0].bar([0], [0], color=PALETTE[kind % len(PALETTE)], label=label)
     if any(row["paper"] is not None for rows in groups.values() for row in rows):
         all_axes[0, 0].plot([], [], color="black", linewidth=2, label="the paper's")
-    figure.legend(loc="outside lower center", ncols=len(labels) + 1, frameon=False)
+    figure.legend(loc="outside lower center", ncols=min(len(labels) + 1, 4), frameon=False)
     _save(figure, path)
 
 
