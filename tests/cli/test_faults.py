@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import functools
 import importlib.util
 import json
 import os
@@ -357,7 +358,11 @@ def test_a_training_that_was_stopped_goes_on(folder: Path, how: signal.Signals) 
     pytest.importorskip("torch", reason="the network needs the extra 'train'")
     day = ["train", folder / "day.aedat4", "--track", folder / "day.csv", "--batch", "8"]
     command = [sys.executable, "-m", "evplace", *map(str, [*day, "--steps", "400"])]
-    process = subprocess.Popen([*command, "-o", folder / "stopped"], stderr=subprocess.PIPE, text=True)
+    # A shell's background jobs, this test among them, are born deaf to SIGINT.
+    hears = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    process = subprocess.Popen(
+        [*command, "-o", folder / "stopped"], stderr=subprocess.PIPE, text=True, preexec_fn=hears
+    )
     until((folder / ".stopped.checkpoint").exists)
     process.send_signal(how)
     _, told = process.communicate(timeout=60)
