@@ -99,11 +99,11 @@ def _answer(
         positions, xy = place_map.items.position, xy_in(place_map, query)
         result = measure(path, truth, rows, positions, query.t_us, settings, xy)
         found[rule] = {"figures": result.figures}
-        if case.swept:
-            found[rule]["curve"] = _curve(
-                case, rows, query, result, truth.accepts, where.scorer.distances
-            ).tolist()
-        if case.keep and len(found) == 1:  # the first rule is the paper's
+        first = len(found) == 1  # the paper's rule
+        if case.swept and first:
+            distances = where.scorer.distances
+            found[rule]["curve"] = _curve(case, rows, query, result, truth.right, distances).tolist()
+        if case.keep and first:
             show = item_images(place_map, query, day)
             assert show is not None  # the map's drive lends its images
             sample(result, query.images, show).save(runs.result_folder(case), overwrite=True)
@@ -118,10 +118,13 @@ def _curve(
     rows: NDArray[np.float32],
     query: Traverse,
     result: Result,
-    accepts: Callable[[NDArray[np.int64]], NDArray[np.bool_]],
+    right: NDArray[np.bool_],
     distances: bool,
 ) -> NDArray[np.float64]:
-    """(values, 3) the swept parameter's value, recall (of the seen) and precision, in the order of recall."""
+    """(values, 3) the swept parameter's value, recall (of the seen) and precision, in the order of recall.
+
+    `right` (queries, items) is the truth.
+    """
     filled = np.flatnonzero(query.counts != 0)
     parameter = SWEPT[case.matcher]
     others = {name: value for name, value in case.matcher_settings.items() if name != parameter}
@@ -130,10 +133,11 @@ def _curve(
     for value, path in sweep(case.matcher, rows[filled], values, parameter, distances=distances, **others):
         item = np.full(len(query), -1, np.int64)
         item[filled] = np.where(path.accepted, path.item, -1)
-        accepted, right = (item >= 0)[result.judged], accepts(item)[result.judged]
+        accepted = (item >= 0)[result.judged]
+        hits = (accepted & right[np.arange(len(item)), item][result.judged]).sum()
         if accepted.any():
             seen = max(int(result.seen[result.judged].sum()), 1)
-            points.append((value, right.sum() / seen, right.sum() / accepted.sum()))
+            points.append((value, hits / seen, hits / accepted.sum()))
     curve = np.array(sorted(points, key=lambda point: (point[1], -point[2]))).reshape(-1, 3)
     return np.asarray(np.nan_to_num(curve, posinf=1e30, neginf=-1e30), np.float64)
 
