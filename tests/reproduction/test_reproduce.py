@@ -119,7 +119,7 @@ def test_figure_5_has_a_curve_for_each_method(table: dict[str, Any], city: Path,
     maps = {file: file.stat().st_mtime_ns for file in (out / "maps").iterdir()}
     figure = reproduce("figure5", out, city, choice=Choice(2, TRAINING, ("events",)), workers=1)
     assert {file: file.stat().st_mtime_ns for file in (out / "maps").iterdir()} == maps
-    assert [curve["panel"] for curve in figure["curves"]].count("day-night") == 6
+    assert [curve["panel"] for curve in figure["curves"]].count("day-night") == 7
     for curve in figure["curves"]:
         points = np.array(curve["points"]).reshape(-1, 3)
         assert (np.diff(points[:, 1]) >= 0).all()
