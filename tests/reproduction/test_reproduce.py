@@ -193,6 +193,7 @@ def test_wrong_wishes_are_one_clear_line(
         reproduce("table3", tmp_path, city)
     with pytest.raises(InputError, match="holds no drives: make them with evplace city"):
         reproduce("table2", tmp_path / "out", tmp_path)
+    assert not (tmp_path / "out").exists()
     with pytest.raises(
         SettingsError, match="'sound' is no input that table2 can be limited to: known are events"
     ):

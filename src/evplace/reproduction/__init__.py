@@ -82,12 +82,13 @@ def reproduce(
     _check(name, family, chosen, count)
     drives = _real_sets(data) if family.NEEDS == "data" else Cities(Path(city or folder / "city"), folder)
     cases = family.cases(drives, chosen)
+    if city is not None or isinstance(drives, RealSets):
+        drives.check(cases)
     began = time.monotonic()
     with locked(folder / "reproduce"):
         if city is None and isinstance(drives, Cities):
             generate(drives.city, workers=count, progress=_of_city(progress))
         runs = Runs(folder, drives.source)
-        drives.check(cases)
         cases = runs.distinct(cases)
         _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, count, progress)
         document: dict[str, Any] = family.collect(drives, runs, chosen)
