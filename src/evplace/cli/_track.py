@@ -40,5 +40,5 @@ class TrackFlags:
             self.track,
             self.track_preset,
             round(self.track_offset * 1e6),
-            **settings.from_pairs(self.track_set),  # type: ignore[arg-type]
+            **settings.from_pairs(self.track_set),  # type: ignore[arg-type]  # checked by the format
         )
