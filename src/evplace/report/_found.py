@@ -190,7 +190,7 @@ def _record(kind: type[T], values: Mapping[str, Any]) -> T:
     """A record of known fields; what else there is is passed over. ValueError says what does not fit."""
     hints = get_type_hints(kind)
     taken = {}
-    for one in dataclasses.fields(kind):  # type: ignore[arg-type]
+    for one in dataclasses.fields(kind):  # type: ignore[arg-type]  # a dataclass, which no TypeVar says
         if one.name in values:
             taken[one.name] = _CHECKS[hints[one.name]](values[one.name], one.name)
         elif one.default is dataclasses.MISSING:
