@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from evplace.doctor import examine
-from evplace.readers import open_recording
+from evplace.sources.readers import open_recording
 
 HEADER = b"% Data file containing CD events.\n% Version 2\n% Width 1280\n% Height 720\n\x0c\x08"
 MILLION = 1_000_000

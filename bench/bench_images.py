@@ -23,10 +23,10 @@ import tonic.transforms
 from evutils.dense import frame_gray
 from numpy.typing import NDArray
 
-from evplace.events import Events, Size
-from evplace.images import Imager
-from evplace.readers import open_recording
-from evplace.windows import TimeWindows
+from evplace.core.events import Events, Size
+from evplace.imaging.images import Imager
+from evplace.imaging.windows import TimeWindows
+from evplace.sources.readers import open_recording
 from harness import alternate, report
 
 SET = 0.17

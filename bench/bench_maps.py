@@ -14,11 +14,11 @@ import numpy as np
 import torch
 from torch.nn.functional import cross_entropy
 
-from evplace.network import Network, NetworkSettings
+from evplace.imaging.traverse import Traverse
 from evplace.places import PlaceRuns
 from evplace.scorers import open_scorer
-from evplace.training import TrainSettings, train, train_network
-from evplace.traverse import Traverse
+from evplace.scorers._network.network import Network, NetworkSettings
+from evplace.scorers._network.training import TrainSettings, train, train_network
 from harness import alternate, report
 
 PLACES, BATCH, STEPS = 104, 64, 10

@@ -12,9 +12,9 @@ import sys
 import numpy as np
 
 import plain_matchers as plain
-from evplace.distances import sad
 from evplace.matchers import open_matcher
 from evplace.matchers.seqslam import Settings, offsets_of
+from evplace.scorers._distances import sad
 from harness import alternate, report
 
 

@@ -25,9 +25,9 @@ from typing import Any
 
 import numpy as np
 
-from evplace.events import Events, Size
-from evplace.readers import open_recording
-from evplace.writers import write_recording
+from evplace.core.events import Events, Size
+from evplace.sources.readers import open_recording
+from evplace.sources.writers import write_recording
 from harness import Timing, alternate
 
 SIZE: Size = (640, 480)
@@ -391,8 +391,8 @@ def show(title: str, count: int, timings: dict[str, Timing]) -> None:
 
 CHILD = """
 import sys, time
-from evplace.readers import open_recording
-from evplace.stream import EventImages, images_of
+from evplace.sources.readers import open_recording
+from evplace.imaging.stream import EventImages, images_of
 recording = open_recording(sys.argv[1])
 first = next(recording.packets())
 list(EventImages(recording.size).push(first))  # compiles, or loads what is compiled

@@ -13,7 +13,7 @@ import numpy as np
 from eventify.dvs import frame_to_event_tuples
 from numpy.typing import NDArray
 
-from evplace.simulators.esim import SensorSettings, Simulator
+from evplace.sources.simulators.esim import SensorSettings, Simulator
 from harness import alternate, report
 
 FRAMES, STEP_US = 200, 4000

@@ -20,17 +20,17 @@ from pathlib import Path
 
 import numpy as np
 
-from evplace.capture import open_source, record
-from evplace.cleaning import CleaningSettings
-from evplace.events import Events, Size
+from evplace.core.events import Events, Size
+from evplace.drives.to_traverse import open_source, record
+from evplace.evaluation._evaluate import evaluate
+from evplace.imaging.traverse import Traverse, new_traverse
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid
-from evplace.readers import open_recording
-from evplace.training import PRESETS, train
-from evplace.traverse import Traverse, new_traverse
-from evplace.trial import evaluate
-from evplace.writers import write_recording
+from evplace.scorers._network.training import PRESETS, train
+from evplace.sources.cleaning import CleaningSettings
+from evplace.sources.readers import open_recording
+from evplace.sources.writers import write_recording
 
 SHARE = 0.005
 """Of the pixels are hot."""

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from evplace.distances import ncc, sad
+from evplace.evaluation.sweeps import sweep
 from evplace.matchers import Path, open_matcher
-from evplace.seqslam_images import normalise_patches
-from evplace.sweeps import sweep
+from evplace.scorers._distances import ncc, sad
+from evplace.scorers._seqslam_images import normalise_patches
 
 MATCHERS: dict[str, tuple[str, dict[str, Any]]] = {
     "best": ("best", {}),

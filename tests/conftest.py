@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from evplace.events import Events
-from evplace.images import ImageSettings
+from evplace.core.events import Events
+from evplace.core.settings import to_dict
+from evplace.imaging.images import ImageSettings
+from evplace.imaging.stream import event_images
+from evplace.imaging.traverse import Traverse
+from evplace.imaging.windows import WindowSettings
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid
-from evplace.settings import to_dict
-from evplace.stream import event_images
-from evplace.tracks import Track
-from evplace.training import train
-from evplace.traverse import Traverse
-from evplace.windows import WindowSettings
-from evplace.writers import write_recording
+from evplace.scorers._network.training import train
+from evplace.sources.tracks import Track
+from evplace.sources.writers import write_recording
 
 settings.register_profile("evplace", deadline=None)  # the first call of a numba loop compiles it
 settings.load_profile("evplace")

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from evplace.events import Events
-from evplace.writers import write_recording
+from evplace.core.events import Events
+from evplace.sources.writers import write_recording
 
 Floats = NDArray[np.float64]
 WGS84 = (6_378_137.0, 0.0066943799901413165)

@@ -1,4 +1,4 @@
-"""The house: one import direction, a light front door."""
+"""One import direction, and a light front door."""
 
 from __future__ import annotations
 
@@ -7,36 +7,66 @@ import subprocess
 import sys
 from pathlib import Path
 
-SRC = Path(__file__).parents[1] / "src" / "evplace"
+import pytest
 
-ROOMS = (
-    "errors plugs storage settings workers events readers writers cleaning windows resampling "
-    "representations tones images stream frames tracks spacing places truth traverse sheets simulators "
-    "datasets capture city placemap network network_onnx augmentation checkpoint training distances "
-    "seqslam_images scorers matchers sweeps localizer evaluation trial doctor charts reproduction report cli"
-).split()
-"""In the order of the data: a room imports only rooms before it, or files of its own."""
+SRC = Path(__file__).parents[1] / "src"
+
+ORDER = {
+    "evplace": "core sources imaging drives places placemap scorers matchers localizer evaluation doctor cli",
+    "evplace.core": "errors events families settings storage workers",
+    "evplace.sources": "frames readers writers cleaning tracks film simulators",
+    "evplace.imaging": "windows resampling representations tones images stream spacing traverse sheets",
+    "evplace.drives": "datasets to_traverse",
+    "evplace.scorers": "_distances _seqslam_images _network",
+    "evplace.scorers._network": "network network_onnx augmentation checkpoint training",
+    "evplace.evaluation": "truth sweeps",
+    "evplace_lab": "city reproduction report cli",
+}
+"""Package -> its parts in the order of the data: a part imports only parts before it, or files of its own."""
 
 
-def imported_rooms(file: Path) -> set[str]:
+def imports(file: Path) -> set[str]:
+    """The modules that a file imports, by their full names, `from a import b` as a.b."""
     found = set()
     for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("evplace"):
-            parts = node.module.split(".")
-            found |= {parts[1]} if len(parts) > 1 else {alias.name for alias in node.names}
+        if isinstance(node, ast.ImportFrom) and node.module:
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
         elif isinstance(node, ast.Import):
-            found |= {alias.name.split(".")[1] for alias in node.names if alias.name.startswith("evplace.")}
+            found |= {alias.name for alias in node.names}
     return found
 
 
-def test_every_room_imports_only_rooms_before_it() -> None:
-    for file in sorted(SRC.rglob("*.py")):
-        room = file.relative_to(SRC).parts[0].removesuffix(".py")
-        if room in ("__init__", "__main__"):
-            continue
-        assert room in ROOMS, f"{file}: give the room a place in the order"
-        allowed = set(ROOMS[: ROOMS.index(room) + 1]) | {"__version__"}
-        assert imported_rooms(file) <= allowed, f"{file} imports {imported_rooms(file) - allowed}"
+def later(file: Path, package: str) -> set[str]:
+    """What a file of `package` imports of it that comes after its own part."""
+    parts = ORDER[package].split()
+    own = file.relative_to(SRC / Path(*package.split("."))).parts[0].removesuffix(".py")
+    if own not in parts:
+        return set()
+    inside = {
+        name.removeprefix(f"{package}.").split(".")[0]
+        for name in imports(file)
+        if name.startswith(f"{package}.")
+    }
+    return inside & set(parts[parts.index(own) + 1 :])
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_a_part_imports_only_parts_before_it(package: str) -> None:
+    for file in sorted((SRC / Path(*package.split("."))).rglob("*.py")):
+        assert not later(file, package), file
+
+
+@pytest.mark.parametrize("package", ["evplace", "evplace_lab"])
+def test_every_part_of_a_package_has_its_place_in_the_order(package: str) -> None:
+    parts = {
+        path.name.removesuffix(".py") for path in (SRC / package).iterdir() if path.name != "__pycache__"
+    }
+    assert parts - {"__init__", "__main__", "py.typed"} == set(ORDER[package].split())
+
+
+def test_the_laboratory_is_never_imported() -> None:
+    for file in sorted((SRC / "evplace").rglob("*.py")):
+        assert not [name for name in imports(file) if name.startswith("evplace_lab")], file
 
 
 def test_import_loads_numpy_and_nothing_heavier() -> None:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from conftest import Drive, make_drive, write_drive
+from evplace.imaging.traverse import Traverse
 from evplace.placemap import PlaceMap
-from evplace.traverse import Traverse
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from conftest import Drive, make_drive, make_traverse
-from evplace.errors import PlaceMapError, RecordingError, SettingsError
-from evplace.events import Events
+from evplace.core.errors import PlaceMapError, RecordingError, SettingsError
+from evplace.core.events import Events
+from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid
-from evplace.training import train
-from evplace.traverse import Traverse
+from evplace.scorers._network.training import train
 
 
 def pushed(where: Localizer, packets: list[Events]) -> list[Match]:

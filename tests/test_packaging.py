@@ -10,8 +10,11 @@ ROOT = Path(__file__).parents[1]
 
 def test_files_beside_the_code_are_packaged() -> None:
     told = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    patterns = told["tool"]["setuptools"]["package-data"]["evplace"]
-    package = ROOT / "src" / "evplace"
+    for name, patterns in told["tool"]["setuptools"]["package-data"].items():
+        check(ROOT / "src" / name, patterns)
+
+
+def check(package: Path, patterns: list[str]) -> None:
     packaged = {file for pattern in patterns for file in package.glob(pattern)}
     files = {file for file in package.rglob("*") if file.is_file() and "__pycache__" not in file.parts}
     assert {file for file in files if file.suffix not in (".py", ".pyc")} == packaged

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evplace.errors import OutputError, PlaceMapError, SettingsError
+from evplace.core.errors import OutputError, PlaceMapError, SettingsError
+from evplace.imaging.traverse import Traverse
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns
 from evplace.scorers import checked_settings, open_scorer
-from evplace.training import train
-from evplace.traverse import Traverse
+from evplace.scorers._network.training import train
 
 
 @pytest.mark.parametrize("kind", ["image_map", "network_map"])

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from evplace import places
-from evplace.errors import PlaceMapError, SettingsError, TrackError
+from evplace.core.errors import PlaceMapError, SettingsError, TrackError
 from evplace.places import PlaceGrid, PlaceRuns
-from evplace.tracks import Track
+from evplace.sources.tracks import Track
 
 POSITIONS = arrays(np.float64, st.tuples(st.integers(1, 40), st.just(2)), elements=st.floats(-300, 300))
 

@@ -6,56 +6,56 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and type checkers; a test holds this list against the one below
-    from evplace.capture import open_traverse as open_traverse
-    from evplace.cleaning import CleaningSettings as CleaningSettings
-    from evplace.errors import EvplaceError as EvplaceError
+    from evplace.core.errors import EvplaceError as EvplaceError
+    from evplace.core.events import Events as Events
+    from evplace.drives.to_traverse import open_traverse as open_traverse
     from evplace.evaluation import Result as Result
     from evplace.evaluation import compare as compare
-    from evplace.events import Events as Events
-    from evplace.images import ImageSettings as ImageSettings
-    from evplace.images import event_image as event_image
+    from evplace.evaluation._evaluate import evaluate as evaluate
+    from evplace.imaging.images import ImageSettings as ImageSettings
+    from evplace.imaging.images import event_image as event_image
+    from evplace.imaging.spacing import SpacingSettings as SpacingSettings
+    from evplace.imaging.traverse import Traverse as Traverse
+    from evplace.imaging.windows import WindowSettings as WindowSettings
     from evplace.localizer import Localizer as Localizer
     from evplace.localizer import Match as Match
     from evplace.placemap import PlaceMap as PlaceMap
     from evplace.places import PlaceGrid as PlaceGrid
     from evplace.places import PlaceRuns as PlaceRuns
-    from evplace.readers import Recording as Recording
-    from evplace.readers import open_recording as open_recording
-    from evplace.spacing import SpacingSettings as SpacingSettings
-    from evplace.tracks import Track as Track
-    from evplace.tracks import open_track as open_track
-    from evplace.training import TrainSettings as TrainSettings
-    from evplace.training import train as train
-    from evplace.traverse import Traverse as Traverse
-    from evplace.trial import evaluate as evaluate
-    from evplace.windows import WindowSettings as WindowSettings
+    from evplace.scorers._network.training import TrainSettings as TrainSettings
+    from evplace.scorers._network.training import train as train
+    from evplace.sources.cleaning import CleaningSettings as CleaningSettings
+    from evplace.sources.readers import Recording as Recording
+    from evplace.sources.readers import open_recording as open_recording
+    from evplace.sources.tracks import Track as Track
+    from evplace.sources.tracks import open_track as open_track
 
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "CleaningSettings": "evplace.cleaning",
-    "Events": "evplace.events",
-    "EvplaceError": "evplace.errors",
-    "ImageSettings": "evplace.images",
+    "CleaningSettings": "evplace.sources.cleaning",
+    "Events": "evplace.core.events",
+    "EvplaceError": "evplace.core.errors",
+    "ImageSettings": "evplace.imaging.images",
     "Localizer": "evplace.localizer",
     "Match": "evplace.localizer",
     "PlaceGrid": "evplace.places",
     "PlaceMap": "evplace.placemap",
     "PlaceRuns": "evplace.places",
-    "Recording": "evplace.readers",
+    "Recording": "evplace.sources.readers",
     "Result": "evplace.evaluation",
-    "SpacingSettings": "evplace.spacing",
-    "Track": "evplace.tracks",
-    "TrainSettings": "evplace.training",
-    "Traverse": "evplace.traverse",
-    "WindowSettings": "evplace.windows",
+    "SpacingSettings": "evplace.imaging.spacing",
+    "Track": "evplace.sources.tracks",
+    "TrainSettings": "evplace.scorers._network.training",
+    "Traverse": "evplace.imaging.traverse",
+    "WindowSettings": "evplace.imaging.windows",
     "compare": "evplace.evaluation",
-    "evaluate": "evplace.trial",
-    "event_image": "evplace.images",
-    "open_recording": "evplace.readers",
-    "open_track": "evplace.tracks",
-    "open_traverse": "evplace.capture",
-    "train": "evplace.training",
+    "evaluate": "evplace.evaluation._evaluate",
+    "event_image": "evplace.imaging.images",
+    "open_recording": "evplace.sources.readers",
+    "open_track": "evplace.sources.tracks",
+    "open_traverse": "evplace.drives.to_traverse",
+    "train": "evplace.scorers._network.training",
 }
 """Public name -> module. Loaded on first use, so that `import evplace` costs numpy at most."""
 

@@ -14,17 +14,17 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace import settings
-from evplace.cleaning import CleaningSettings, MaskSource, read_mask
-from evplace.errors import PlaceMapError, RecordingError
-from evplace.events import Events
-from evplace.images import ImageSettings
+from evplace.core import settings
+from evplace.core.errors import PlaceMapError, RecordingError
+from evplace.core.events import Events
+from evplace.imaging.images import ImageSettings
+from evplace.imaging.stream import EventImage, EventImages
+from evplace.imaging.traverse import Traverse
+from evplace.imaging.windows import WindowSettings
 from evplace.matchers import Answer, Matcher, Path, open_matcher, resolved_settings
 from evplace.placemap import PlaceMap
 from evplace.scorers import Rows, open_scorer
-from evplace.stream import EventImage, EventImages
-from evplace.traverse import Traverse
-from evplace.windows import WindowSettings
+from evplace.sources.cleaning import CleaningSettings, MaskSource, read_mask
 
 State = Literal["localised", "unseen", "no-events"]
 
@@ -61,8 +61,8 @@ class Localizer:
         """For one map, with a matcher by name, one of its presets, and its settings.
 
         Events are cleaned as those of the map were. Which pixels are hot belongs to the drive, so a map that
-        was learned without hot pixels needs the drive's own `mask` (see `evplace.cleaning.read_mask`, and
-        `pixel_mask` to measure it). Raises SettingsError for an unknown matcher, preset or setting.
+        was learned without hot pixels needs the drive's own `mask` (see `evplace.sources.cleaning.read_mask`,
+        and `pixel_mask` to measure it). Raises SettingsError for an unknown matcher, preset or setting.
         """
         self.map = place_map
         self.scorer = open_scorer(place_map)

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace import places
-from evplace.errors import InputError, PlaceMapError
+from evplace.core.errors import InputError, PlaceMapError
+from evplace.core.storage import new_folder, read_array, read_json, sha256, write_json
 from evplace.places import Places
-from evplace.storage import new_folder, read_array, read_json, sha256, write_json
 
 FORMAT = "evplace-map-1"
 SUMS = "SHA256SUMS"

@@ -14,8 +14,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from evplace.errors import PlaceMapError, SettingsError, TrackError
-from evplace.tracks import Track
+from evplace.core.errors import PlaceMapError, SettingsError, TrackError
+from evplace.sources.tracks import Track
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

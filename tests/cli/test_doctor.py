@@ -9,7 +9,7 @@ import pytest
 
 from conftest import make_drive, write_drive
 from evplace.cli import main
-from evplace.writers import write_recording
+from evplace.sources.writers import write_recording
 
 Capture = pytest.CaptureFixture[str]
 

@@ -19,10 +19,10 @@ import pytest
 from PIL import Image
 
 from conftest import make_drive, write_drive
-from evplace import storage
 from evplace.cli import main
-from evplace.events import Events
-from evplace.writers import write_recording
+from evplace.core import storage
+from evplace.core.events import Events
+from evplace.sources.writers import write_recording
 
 Capture = pytest.CaptureFixture[str]
 

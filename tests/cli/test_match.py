@@ -9,7 +9,7 @@ import pytest
 import tyro
 
 from evplace.cli.match import Args, run
-from evplace.errors import OutputError, ScoresError, SettingsError
+from evplace.core.errors import OutputError, ScoresError, SettingsError
 from evplace.matchers import open_matcher
 
 SCORES = np.random.default_rng(0).uniform(0.1, 1, (40, 30)).astype(np.float32)

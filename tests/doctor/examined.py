@@ -8,10 +8,10 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.events import Events, Size
 from evplace.doctor import Finding, Outcome, Subject
-from evplace.events import Events, Size
-from evplace.tracks import Track
-from evplace.windows import WindowSettings
+from evplace.imaging.windows import WindowSettings
+from evplace.sources.tracks import Track
 
 SIZE = (64, 48)
 

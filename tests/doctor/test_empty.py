@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evplace.doctor import empty
-from evplace.windows import TimeWindows, WindowSettings
+from evplace.imaging.windows import TimeWindows, WindowSettings
 
 
 @given(

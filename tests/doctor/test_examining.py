@@ -10,11 +10,11 @@ import pytest
 from examined import SIZE, noise, outcome, road
 
 from conftest import make_drive, write_drive
-from evplace import plugs
+from evplace.core import families as plugs
+from evplace.core.errors import InputError, OutputError, SettingsError, TrackError
+from evplace.core.events import Events
 from evplace.doctor import STATES, Examination, as_json, draw, examine
-from evplace.errors import InputError, OutputError, SettingsError, TrackError
-from evplace.events import Events
-from evplace.writers import write_recording
+from evplace.sources.writers import write_recording
 
 PARTS = [plugs.load("doctor", name) for name in plugs.names("doctor")]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from evplace.core.errors import SettingsError
 from evplace.doctor import Curve, Examination, examine
-from evplace.errors import SettingsError
-from evplace.frames import open_frames
+from evplace.sources.frames import open_frames
 
 
 def film(folder: Path, places: list[float], times_s: list[float] | None = None) -> Path:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from examined import SIZE, found, merged, noise, outcome
 
+from evplace.core.events import Events
 from evplace.doctor import Map, flicker
-from evplace.events import Events
 
 
 def lamp(frequency_hz: float, seconds: float = 2.0, seed: int = 0) -> Events:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from examined import SIZE, found, noise, outcome, road
 
+from evplace.core.events import Events
 from evplace.doctor import gps
-from evplace.events import Events
 
 T_S = np.arange(0, 60.1, 0.5)
 EVENTS = noise(500, 60)

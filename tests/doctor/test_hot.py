@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from examined import SIZE, found, merged, noise, outcome
 
+from evplace.core.events import Events
 from evplace.doctor import Map, hot
-from evplace.events import Events
 
 HOT = [(3, 4), (40, 30), (63, 47)]
 

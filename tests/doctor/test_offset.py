@@ -7,11 +7,11 @@ import pytest
 from examined import SIZE, at_times, found, outcome, road
 from numpy.typing import NDArray
 
+from evplace.core.events import Events
 from evplace.doctor import Curve, offset
 from evplace.doctor._subject import mean_around
 from evplace.doctor.offset import Fit, Offset
-from evplace.events import Events
-from evplace.tracks import Track
+from evplace.sources.tracks import Track
 
 Floats = NDArray[np.float64]
 

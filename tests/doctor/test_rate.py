@@ -8,9 +8,9 @@ from examined import SIZE, found, noise, outcome
 from hypothesis import given
 from hypothesis import strategies as st
 
+from evplace.core.events import Events
 from evplace.doctor import rate
 from evplace.doctor._subject import BIN_US, Rates, mean_around, stretches
-from evplace.events import Events
 
 
 @given(st.lists(st.integers(0, 3_000_000), min_size=1), st.integers(1, 20))

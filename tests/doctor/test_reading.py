@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from examined import SIZE, noise
 
+from evplace.core.events import Events
 from evplace.doctor import Examination, examine
-from evplace.events import Events
-from evplace.writers import write_recording
+from evplace.sources.writers import write_recording
 
 
 def written(folder: Path, events: Events, **columns: Any) -> Path:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from examined import SIZE, found, merged, noise
 
+from evplace.core.events import Events
 from evplace.doctor import repeats
-from evplace.events import Events
 
 
 def plain(events: Events) -> tuple[int, int]:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from examined import at_times, found, noise, outcome, road
 
+from evplace.core.events import Events
 from evplace.doctor import standing
-from evplace.events import Events
 
 
 def drive(stops: list[tuple[float, float]], seconds: float = 60.0) -> Events:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from examined import SIZE, found, noise
 
+from evplace.core.events import Events
 from evplace.doctor import static
-from evplace.events import Events
 
 
 def above(rows: int) -> Events:

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evplace import plugs
-from evplace.errors import ScoresError, SettingsError
+from evplace.core import families as plugs
+from evplace.core.errors import ScoresError, SettingsError
+from evplace.core.settings import to_dict
 from evplace.matchers import Path, open_matcher
-from evplace.settings import to_dict
 
 NAMES = plugs.names("matchers")
 PRESETS = [(name, preset) for name in NAMES for preset in [None, *plugs.load("matchers", name).PRESETS]]

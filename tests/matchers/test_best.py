@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from evplace.errors import ScoresError
+from evplace.core.errors import ScoresError
 from evplace.matchers import Path, open_matcher
 
 

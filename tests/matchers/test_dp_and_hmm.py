@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evplace.errors import SettingsError
+from evplace.core.errors import SettingsError
 from evplace.matchers import open_matcher
 from evplace.matchers._viterbi import Viterbi
 from evplace.matchers.hmm import Settings, log_odds, moving_mean, without_leading

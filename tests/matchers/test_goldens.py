@@ -10,7 +10,7 @@ import pytest
 
 from evplace.matchers import open_matcher
 from evplace.matchers.seqslam import Settings, offsets_of, sequence_scores
-from evplace.seqslam_images import normalise_patches
+from evplace.scorers._seqslam_images import normalise_patches
 
 TINY = dict(np.load(Path(__file__).parents[1] / "golden" / "tiny.npz"))
 SCENES = ["randwalk", "loop", "unmatched"]

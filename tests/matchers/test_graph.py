@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evplace.errors import ScoresError, SettingsError
+from evplace.core.errors import ScoresError, SettingsError
 from evplace.matchers import Path, open_matcher
 from evplace.matchers._hashing import HashRelocaliser, bits
 

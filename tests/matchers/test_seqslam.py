@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evplace.errors import SettingsError
+from evplace.core.errors import SettingsError
 from evplace.matchers import open_matcher
 from evplace.matchers._seqslam_search import enhance, trajectories
 from evplace.matchers.seqslam import Settings, offsets_of, sequence_scores

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from evplace.errors import SettingsError
+from evplace.core.errors import SettingsError
 from evplace.scorers import seqslam
+from evplace.scorers._seqslam_images import prepare
 from evplace.scorers.cosine import CosineScorer
 from evplace.scorers.ncc import NccScorer, Settings, _reduction
 from evplace.scorers.sad import SadScorer
-from evplace.seqslam_images import prepare
 
 Images = NDArray[np.uint8]
 

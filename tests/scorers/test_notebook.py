@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from evplace.errors import PlaceMapError
+from evplace.core.errors import PlaceMapError
+from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
-from evplace.traverse import Traverse
 
 pytest.importorskip("torch", reason="the network needs the extra 'train'")
 

@@ -12,9 +12,11 @@ import difflib
 import importlib
 import os
 import sys
+from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 
-from evplace.errors import EvplaceError
+from evplace.core.errors import EvplaceError
 
 INTERRUPTED = 130
 
@@ -38,8 +40,13 @@ def main(argv: list[str] | None = None) -> int:
 
 def commands() -> dict[str, str]:
     """Command -> summary, read from the files without importing them."""
-    files = sorted(Path(__file__).parent.glob("[a-z]*.py"))
-    return {file.stem: _summary(file) for file in files}
+    return {name: _summary(module) for name, module in sorted(_modules().items())}
+
+
+def _modules() -> dict[str, str]:
+    """Command -> module: our own files, and the entry points of other packages."""
+    own = {file.stem: f"evplace.cli.{file.stem}" for file in Path(__file__).parent.glob("[a-z]*.py")}
+    return {entry.name: entry.value for entry in entry_points(group="evplace.commands")} | own
 
 
 def _run(arguments: list[str]) -> int:
@@ -57,7 +64,7 @@ def _run(arguments: list[str]) -> int:
         close = difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean '{close[0]}'? " if close else ""
         raise EvplaceError(f"unknown command '{name}': {hint}commands are {', '.join(known)}")
-    module = importlib.import_module(f"evplace.cli.{name}")
+    module = importlib.import_module(_modules()[name])
     from evplace.cli._parse import parse
 
     code: int = module.run(parse(module, name, arguments[1:]))
@@ -78,6 +85,9 @@ def _overview(known: dict[str, str]) -> str:
     )
 
 
-def _summary(file: Path) -> str:
-    docstring = ast.get_docstring(ast.parse(file.read_text("utf-8"))) or ""
+def _summary(module: str) -> str:
+    spec = find_spec(module)
+    assert spec is not None
+    assert spec.origin is not None
+    docstring = ast.get_docstring(ast.parse(Path(spec.origin).read_text("utf-8"))) or ""
     return docstring.splitlines()[0].rstrip(".")

@@ -11,8 +11,8 @@ from typing import Any, get_type_hints
 
 import tyro
 
-from evplace import settings
-from evplace.errors import SettingsError
+from evplace.core import settings
+from evplace.core.errors import SettingsError
 
 
 def parse(module: ModuleType, name: str, arguments: list[str]) -> Any:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import tyro
 
-from evplace import settings
-from evplace.errors import SettingsError
-from evplace.tracks import Track, open_track
+from evplace.core import settings
+from evplace.core.errors import SettingsError
+from evplace.sources.tracks import Track, open_track
 
 MOST_S = 1e10
 """Seconds by which a track may be shifted: three centuries, more than any two clocks differ by."""

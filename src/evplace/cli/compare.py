@@ -14,7 +14,7 @@ from pathlib import Path
 import tyro
 
 from evplace.cli._output import print_json, print_table
-from evplace.errors import SettingsError
+from evplace.core.errors import SettingsError
 from evplace.evaluation import compare
 
 

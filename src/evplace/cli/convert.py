@@ -17,11 +17,11 @@ from typing import Literal
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
-from evplace.datasets.utm_folders import write_images
-from evplace.errors import DamagedRecordingError
-from evplace.readers import open_recording
-from evplace.traverse import Traverse
-from evplace.writers import write_recording
+from evplace.core.errors import DamagedRecordingError
+from evplace.drives.datasets.utm_folders import write_images
+from evplace.imaging.traverse import Traverse
+from evplace.sources.readers import open_recording
+from evplace.sources.writers import write_recording
 
 
 @dataclass(frozen=True)

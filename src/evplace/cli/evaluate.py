@@ -17,21 +17,21 @@ from typing import Annotated, Literal
 
 import tyro
 
-from evplace import settings
-from evplace.capture import open_traverse
-from evplace.charts import curve_chart
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
 from evplace.cli._track import TrackFlags
-from evplace.errors import MissingExtraError, SettingsError
+from evplace.core import settings
+from evplace.core.errors import MissingExtraError, SettingsError
+from evplace.core.storage import check_new_folder
+from evplace.drives.to_traverse import open_traverse
 from evplace.evaluation import MARK
-from evplace.images import ImageSettings
+from evplace.evaluation._evaluate import evaluate
+from evplace.evaluation.charts import curve_chart
+from evplace.evaluation.truth import Truth, by_frames, by_matrix
+from evplace.imaging.images import ImageSettings
+from evplace.imaging.traverse import Traverse
+from evplace.imaging.windows import WindowSettings
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
-from evplace.storage import check_new_folder
-from evplace.traverse import Traverse
-from evplace.trial import evaluate
-from evplace.truth import Truth, by_frames, by_matrix
-from evplace.windows import WindowSettings
 
 SHOWN = (
     "queries", "left_out", "accuracy", "accuracy_seen", "rejection_rate", "precision", "recall",

@@ -21,18 +21,18 @@ from typing import Annotated, Any, Literal, TypeVar
 
 import tyro
 
-from evplace.capture import is_kept, open_source, record
-from evplace.cleaning import CleaningSettings
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
 from evplace.cli._track import TrackFlags
-from evplace.datasets import Drive
-from evplace.errors import SettingsError
-from evplace.images import ImageSettings
-from evplace.sheets import contact_sheet
-from evplace.spacing import SpacingSettings
-from evplace.storage import check_new_file
-from evplace.traverse import Traverse, TraverseWriter, new_traverse
-from evplace.windows import WindowSettings
+from evplace.core.errors import SettingsError
+from evplace.core.storage import check_new_file
+from evplace.drives.datasets import Drive
+from evplace.drives.to_traverse import is_kept, open_source, record
+from evplace.imaging.images import ImageSettings
+from evplace.imaging.sheets import contact_sheet
+from evplace.imaging.spacing import SpacingSettings
+from evplace.imaging.traverse import Traverse, TraverseWriter, new_traverse
+from evplace.imaging.windows import WindowSettings
+from evplace.sources.cleaning import CleaningSettings
 
 OF_EVENTS = {"representation", "blur", "blur_last", "saturation", "tau_ms", "bins"}
 """Settings of images that camera images do not take."""

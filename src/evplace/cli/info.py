@@ -15,8 +15,8 @@ from typing import Literal
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
-from evplace.errors import DamagedRecordingError
-from evplace.readers import open_recording
+from evplace.core.errors import DamagedRecordingError
+from evplace.sources.readers import open_recording
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from typing import Literal, get_args
 
 import tyro
 
-from evplace import plugs
 from evplace.cli._output import print_facts, print_json
+from evplace.core import families as plugs
 
 Family = Literal["readers", "writers", "tracks", "datasets", "scorers", "matchers"]
 

@@ -21,15 +21,15 @@ from typing import Annotated, Literal
 
 import tyro
 
-from evplace import settings
-from evplace.cleaning import pixel_mask
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
-from evplace.errors import DamagedRecordingError
+from evplace.core import settings
+from evplace.core.errors import DamagedRecordingError
+from evplace.core.storage import new_file
+from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
-from evplace.readers import open_recording
-from evplace.storage import new_file
-from evplace.traverse import Traverse
+from evplace.sources.cleaning import pixel_mask
+from evplace.sources.readers import open_recording
 
 COLUMNS = ("t_us", "place", "easting", "northing", "score", "state")
 

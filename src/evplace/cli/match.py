@@ -18,7 +18,7 @@ from typing import Annotated
 
 import tyro
 
-from evplace import settings
+from evplace.core import settings
 from evplace.matchers import _files, open_matcher
 
 

@@ -18,13 +18,13 @@ from typing import Annotated, Literal
 
 import tyro
 
-from evplace import settings as settings_room
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json, remarks
-from evplace.errors import DamagedRecordingError
-from evplace.events import Events
-from evplace.simulators.esim import PRESETS, SensorSettings, simulate
-from evplace.simulators.frames import open_film
-from evplace.writers import write_recording
+from evplace.core import settings as settings_room
+from evplace.core.errors import DamagedRecordingError
+from evplace.core.events import Events
+from evplace.sources.film import open_film
+from evplace.sources.simulators.esim import PRESETS, SensorSettings, simulate
+from evplace.sources.writers import write_recording
 
 
 @dataclass(frozen=True)

@@ -19,21 +19,21 @@ from typing import Annotated, Literal
 
 import tyro
 
-from evplace import settings as settings_room
-from evplace.capture import open_traverse
-from evplace.cleaning import CleaningSettings
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
 from evplace.cli._track import TrackFlags
-from evplace.errors import TraverseError
-from evplace.images import ImageSettings
+from evplace.core import settings as settings_room
+from evplace.core.errors import TraverseError
+from evplace.core.storage import check_new_folder
+from evplace.drives.to_traverse import open_traverse
+from evplace.imaging.images import ImageSettings
+from evplace.imaging.spacing import SpacingSettings
+from evplace.imaging.traverse import Traverse
+from evplace.imaging.windows import WindowSettings
 from evplace.placemap import MARK
 from evplace.places import PlaceGrid, PlaceRuns, Places
 from evplace.scorers import checked_settings
-from evplace.spacing import SpacingSettings
-from evplace.storage import check_new_folder
-from evplace.training import PRESETS, TrainSettings, train
-from evplace.traverse import Traverse
-from evplace.windows import WindowSettings
+from evplace.scorers._network.training import PRESETS, TrainSettings, train
+from evplace.sources.cleaning import CleaningSettings
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from evplace.core.errors import MissingExtraError
+from evplace.core.storage import check_new_folder, new_folder, write_json
 from evplace.doctor._outcome import Curve, Examination, Map
-from evplace.errors import MissingExtraError
-from evplace.storage import check_new_folder, new_folder, write_json
 
 FINDINGS = "findings.json"
 """What tells a folder that was written here from any other: only such a one is replaced."""

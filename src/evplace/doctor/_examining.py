@@ -7,16 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from evplace import plugs
-from evplace.capture import open_source
+from evplace.core import families as plugs
+from evplace.core.errors import DamagedRecordingError, InputError, TrackError
+from evplace.core.events import Events, Size
 from evplace.doctor._outcome import STATES, Examination, Finding, Outcome
 from evplace.doctor._subject import Subject
-from evplace.errors import DamagedRecordingError, InputError, TrackError
-from evplace.events import Events, Size
-from evplace.simulators.frames import Film
-from evplace.simulators.motion import Frame
-from evplace.tracks import Track, open_track
-from evplace.windows import WindowSettings
+from evplace.drives.to_traverse import open_source
+from evplace.imaging.windows import WindowSettings
+from evplace.sources.film import Film
+from evplace.sources.simulators.motion import Frame
+from evplace.sources.tracks import Track, open_track
 
 
 class Check(Protocol):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.tracks import Track
+from evplace.sources.tracks import Track
 
 Floats = NDArray[np.float64]
 

@@ -10,12 +10,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from evplace.cleaning import count_pixels
+from evplace.core.events import Events, Size
 from evplace.doctor._silences import Silences
-from evplace.events import Events, Size
-from evplace.readers import Recording
-from evplace.tracks import Track
-from evplace.windows import WindowSettings
+from evplace.imaging.windows import WindowSettings
+from evplace.sources.cleaning import count_pixels
+from evplace.sources.readers import Recording
+from evplace.sources.tracks import Track
 
 BIN_US = 100_000
 """Events are counted in each tenth of a second."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from evplace.core.events import Events
 from evplace.doctor._outcome import Finding, Outcome, State
 from evplace.doctor._subject import Subject
-from evplace.events import Events
-from evplace.windows import MICROSECONDS
+from evplace.imaging.windows import MICROSECONDS
 
 OF = ("events",)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from evplace.doctor._outcome import Curve, Finding, Outcome, State, counted
 from evplace.doctor._subject import Subject
-from evplace.simulators.motion import TOO_FAST, Frame, image_motion
+from evplace.sources.simulators.motion import TOO_FAST, Frame, image_motion
 
 OF = ("frames",)
 

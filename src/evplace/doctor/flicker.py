@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.cleaning import MAINS_HZ, FlickerMeter
+from evplace.core.events import Events
 from evplace.doctor._outcome import Finding, Map, Outcome, State
 from evplace.doctor._subject import Subject
-from evplace.events import Events
+from evplace.sources.cleaning import MAINS_HZ, FlickerMeter
 
 OF = ("events",)
 

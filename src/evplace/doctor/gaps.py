@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from evplace.core.events import Events
 from evplace.doctor._outcome import Finding, Outcome, State, counted
 from evplace.doctor._silences import LEAP_US
 from evplace.doctor._subject import Subject
-from evplace.events import Events
 
 OF = ("events",)
 

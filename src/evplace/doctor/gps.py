@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from evplace.doctor._outcome import Finding, Outcome, State, counted
 from evplace.doctor._subject import Subject, mean_around
-from evplace.tracks import Track
+from evplace.sources.tracks import Track
 
 OF = ("events", "frames")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from evplace.cleaning import hot_pixels
+from evplace.core.events import Events
 from evplace.doctor._outcome import Finding, Map, Outcome, State
 from evplace.doctor._subject import Subject
-from evplace.events import Events
+from evplace.sources.cleaning import hot_pixels
 
 OF = ("events",)
 

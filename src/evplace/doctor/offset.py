@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from evplace.doctor._outcome import Curve, Finding, Outcome, State
 from evplace.doctor._speed import speed_at, speeds, turning_at
 from evplace.doctor._subject import BIN_US, Subject
-from evplace.tracks import Track
+from evplace.sources.tracks import Track
 
 OF = ("events", "frames")
 

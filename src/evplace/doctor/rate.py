@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from evplace.core.events import Events
 from evplace.doctor._outcome import Curve, Finding, Outcome
 from evplace.doctor._subject import BIN_US, Subject
-from evplace.events import Events
 
 OF = ("events",)
 

@@ -6,9 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.events import Events
 from evplace.doctor._outcome import Finding, Outcome, State
 from evplace.doctor._subject import Subject
-from evplace.events import Events
 
 OF = ("events",)
 

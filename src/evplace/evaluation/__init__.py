@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from evplace import __version__
-from evplace.errors import EvaluationError
+from evplace.core.errors import EvaluationError
 from evplace.evaluation import _measures
 from evplace.evaluation._measures import (
     CURVE,
@@ -34,8 +34,8 @@ from evplace.evaluation._measures import (
 )
 from evplace.evaluation._result import MARK, OUTCOMES, Result
 from evplace.evaluation._samples import ItemImages, Samples, choose, pictures
+from evplace.evaluation.truth import Truth
 from evplace.matchers import Path as Answers
-from evplace.truth import Truth
 
 __all__ = [
     "CURVE",

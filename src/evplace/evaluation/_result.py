@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace import storage
-from evplace.errors import EvaluationError, InputError
+from evplace.core import storage
+from evplace.core.errors import EvaluationError, InputError
 from evplace.evaluation._measures import CURVE, Bools, Floats
 from evplace.evaluation._samples import Samples
 from evplace.matchers import Path as Answers

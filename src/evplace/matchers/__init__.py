@@ -15,8 +15,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace import plugs, settings
-from evplace.errors import SettingsError
+from evplace.core import families as plugs
+from evplace.core import settings
+from evplace.core.errors import SettingsError
 
 Row = NDArray[np.floating[Any]]
 """(items,) scores of one query against every map item, larger is better."""

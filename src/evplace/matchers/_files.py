@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace import storage
-from evplace.errors import ScoresError
+from evplace.core import storage
+from evplace.core.errors import ScoresError
 from evplace.matchers import Path, Rows
 
 HEADER = "query,reference,score,accepted"

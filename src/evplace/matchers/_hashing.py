@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from evplace.errors import ScoresError
+from evplace.core.errors import ScoresError
 from evplace.matchers import Row
 
 Features = NDArray[Any]

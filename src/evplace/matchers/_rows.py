@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.errors import ScoresError
+from evplace.core.errors import ScoresError
 from evplace.matchers import Path, Rows
 
 

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.errors import ScoresError, SettingsError
+from evplace.core.errors import ScoresError, SettingsError
 from evplace.matchers import Answer, Matcher, Path, Row, Rows
 from evplace.matchers import _graph_search as search
 from evplace.matchers._rows import RowCheck

@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.errors import SettingsError
+from evplace.core.errors import SettingsError
 from evplace.matchers import Answer, Matcher, Path, Row, Rows
 from evplace.matchers._rows import RowCheck, as_table
 from evplace.matchers._seqslam_search import enhance

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from evplace.errors import SettingsError
+from evplace.core.errors import SettingsError
 from evplace.matchers import Answer, Matcher, Path, Row, Rows
 from evplace.matchers._rows import Answers, RowCheck
 

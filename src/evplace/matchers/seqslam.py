@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.errors import SettingsError
+from evplace.core.errors import SettingsError
 from evplace.matchers import Answer, Matcher, Path, Row, Rows
 from evplace.matchers import _seqslam_search as search
 from evplace.matchers._rows import Columns, RowCheck

@@ -11,8 +11,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace import plugs, settings
-from evplace.errors import PlaceMapError
+from evplace.core import families as plugs
+from evplace.core import settings
+from evplace.core.errors import PlaceMapError
 from evplace.placemap import PlaceMap
 
 Rows = NDArray[np.float32]

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.errors import SettingsError
+from evplace.core.errors import SettingsError
+from evplace.core.settings import make
 from evplace.placemap import PlaceMap
 from evplace.scorers import references_of
-from evplace.settings import make
 
 FLAT = 1e-3
 """Below this length, in grey levels, what is left of an image is rounding."""

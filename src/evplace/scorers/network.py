@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.errors import PlaceMapError
+from evplace.core.errors import PlaceMapError
 from evplace.placemap import PlaceMap
 
 BATCH = 64

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.errors import PlaceMapError
+from evplace.core.errors import PlaceMapError
+from evplace.core.settings import make
 from evplace.placemap import PlaceMap
-from evplace.settings import make
 
 SEED = 0
 """Draws what dropout drops."""
@@ -39,8 +39,8 @@ class NotebookScorer:
         """From a map with a network's weights."""
         import torch
 
-        from evplace.network import Network, NetworkSettings
-        from evplace.training import image_shape
+        from evplace.scorers._network.network import Network, NetworkSettings
+        from evplace.scorers._network.training import image_shape
 
         height, width, *channels = place_map.image_shape
         shape = image_shape(np.empty((0, height, width, *channels), np.uint8))
@@ -57,7 +57,7 @@ class NotebookScorer:
         """See Scorer; all of `images` are one batch."""
         import torch
 
-        from evplace.network import to_input
+        from evplace.scorers._network.network import to_input
 
         torch.manual_seed(SEED)
         with torch.inference_mode():

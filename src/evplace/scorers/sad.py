@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.distances import sad
 from evplace.placemap import PlaceMap
 from evplace.scorers import references_of
+from evplace.scorers._distances import sad
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.distances import sad
-from evplace.errors import SettingsError
+from evplace.core.errors import SettingsError
+from evplace.core.settings import make
 from evplace.placemap import PlaceMap
 from evplace.scorers import references_of
-from evplace.seqslam_images import prepare
-from evplace.settings import make
+from evplace.scorers._distances import sad
+from evplace.scorers._seqslam_images import prepare
 
 
 @dataclass(frozen=True)

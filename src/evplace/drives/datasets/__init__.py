@@ -1,0 +1,100 @@
+"""Folders of public data sets -> drives: what was recorded, where, and how it is cut by default.
+
+One file a data set, recognised by its layout. To add one, add its file and its test. The file's docstring
+opens with what the set is and gives citation, licence, layout and address; it says what of the layout was
+checked, and against what. The file holds:
+
+- `NEEDS`, one line of text that says what must lie in the folder;
+- `recognises(folder) -> bool`: whether the layout is there, told from names alone;
+- `drives(folder) -> list[str]`: the names of the drives that are there;
+- `open_drive(folder, name) -> Drive`: the parts of one of them; DatasetError, TraverseError or TrackError
+  where one is missing or does not fit.
+
+Nothing is downloaded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from evplace.core import families as plugs
+from evplace.core.errors import DatasetError
+from evplace.imaging.images import ImageSettings
+from evplace.imaging.windows import WindowSettings
+from evplace.sources.film import Film
+from evplace.sources.readers import Recording
+from evplace.sources.tracks import Track
+
+__all__ = ["Drive", "drives", "matching", "open_drive"]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The parts of one drive."""
+
+    source: Recording | Film
+    """An event recording, or camera images."""
+    track: Track | None = None
+    """Where the camera was, on the clock of `source`."""
+    mask: Path | None = None
+    """A list of the sensor's hot pixels: a text file of `x,y` lines."""
+    simulate: bool | None = False
+    """Whether camera images become simulated events unless they are asked for themselves; None: never,
+    because they are no film (event images, or photos in no order of time)."""
+    windows: WindowSettings = field(default_factory=WindowSettings)
+    """How events are cut, unless the user says otherwise."""
+    images: ImageSettings = field(default_factory=ImageSettings)
+    """How images are made, unless the user says otherwise."""
+
+
+def open_drive(folder: str | Path, drive: str | None = None, dataset: str | None = None) -> Drive:
+    """The drive of that name in a data set's folder; the only one there is where `drive` is None.
+
+    The set is recognised by its layout, or named by `dataset`. Raises DatasetError for a folder of no known
+    layout or of several, and for a drive that is not there; SettingsError for an unknown data set.
+    """
+    place = Path(folder)
+    part = plugs.load("datasets", _name_of(place, dataset))
+    known: list[str] = part.drives(place)
+    if not known:
+        raise DatasetError(f"{place} holds no drive of {_short(part.__name__)}, which needs: {part.NEEDS}")
+    if drive is None and len(known) > 1:
+        raise DatasetError(f"{place} holds {len(known)} drives: say which with --drive: {', '.join(known)}")
+    if drive is not None and drive not in known:
+        raise DatasetError(f"{place} holds no drive '{drive}': it holds {', '.join(known)}")
+    opened: Drive = part.open_drive(place, drive or known[0])
+    return opened
+
+
+def drives(folder: str | Path, dataset: str | None = None) -> list[str]:
+    """The names of the drives in a data set's folder; errors as `open_drive`."""
+    place = Path(folder)
+    found: list[str] = plugs.load("datasets", _name_of(place, dataset)).drives(place)
+    return found
+
+
+def matching(folder: Path) -> list[str]:
+    """The data sets whose layout the folder has."""
+    return [name for name in plugs.names("datasets") if plugs.load("datasets", name).recognises(folder)]
+
+
+def _name_of(folder: Path, dataset: str | None) -> str:
+    if not folder.is_dir():
+        raise DatasetError(f"there is no folder {folder}: give the folder of a data set")
+    if dataset is not None:
+        return dataset
+    found = matching(folder)
+    if not found:
+        known = ", ".join(plugs.names("datasets"))
+        raise DatasetError(
+            f"{folder} has the layout of no known data set: known are {known}; "
+            "`evplace list datasets` says what each needs"
+        )
+    if len(found) > 1:
+        raise DatasetError(f"{folder} may be {' or '.join(found)}: say which with --dataset")
+    return found[0]
+
+
+def _short(module: str) -> str:
+    return module.rpartition(".")[2]

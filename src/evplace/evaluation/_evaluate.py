@@ -1,0 +1,147 @@
+"""A trial: one localizer on one query traverse, judged by where the query really was."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core.errors import EvaluationError
+from evplace.evaluation import ItemImages, Result, measure, sample
+from evplace.evaluation.truth import Truth, by_cells, by_places, only_views
+from evplace.imaging.traverse import Traverse
+from evplace.localizer import Localizer
+from evplace.placemap import PlaceMap
+from evplace.places import PlaceGrid, PlaceRuns
+from evplace.sources.tracks import Track
+
+Rule = Literal["places", "view"]
+MARGIN_M = 1000.0
+"""A query further than this from all of the map's ground is taken for a mistake."""
+
+
+def evaluate(
+    where: Localizer,
+    query: Traverse,
+    truth: Truth | None = None,
+    rule: Rule = "places",
+    reference: Traverse | None = None,
+) -> Result:
+    """Localise the whole `query` and measure the answers.
+
+    Without `truth`, the positions are: by `rule` places, an answer is right in the query's cell or one of its
+    eight neighbours (paper, section 3.4), and a query is seen where the map has any such cell. By view it is
+    seen only where the map holds a reference within 20 m that looks within 34 degrees the same way.
+    `reference`, the map's own drive, lends a network's map the images of the samples; a map of images has
+    them. Raises EvaluationError where query and map share no ground, or the truth or reference do not fit.
+    """
+    started = time.perf_counter()
+    show = item_images(where.map, query, reference)
+    truth = truth or truth_of(where.map, query, rule)
+    path, rows = where.path(query)
+    settings = {
+        "map": where.map.settings,
+        "scorer": where.map.scorer,
+        "matcher": where.settings,
+        "query": query.info.get("source"),
+    }
+    xy = xy_in(where.map, query)
+    result = measure(path, truth, rows, where.map.items.position, query.t_us, settings, xy)
+    result = dataclasses.replace(result, took_s=round(time.perf_counter() - started, 3))
+    return sample(result, query.images, show) if show is not None else result
+
+
+def truth_of(place_map: PlaceMap, query: Traverse, rule: Rule = "places") -> Truth:
+    """Which items of a map are right for each image of a query."""
+    track = _same_zone(place_map, query.track)
+    if isinstance(place_map.places, PlaceRuns):
+        return _by_runs(place_map, place_map.places, query)
+    if track is None:
+        raise EvaluationError("the query has no positions: give its track, or the truth as a matrix")
+    _check_overlap(place_map, track)
+    truth = _by_place(place_map, place_map.places, track)
+    return only_views(truth, track, _references(place_map)) if rule == "view" else truth
+
+
+def xy_in(place_map: PlaceMap, query: Traverse) -> NDArray[np.float64] | None:
+    """(queries, 2) the query's positions in metres of the map's zone; None without any."""
+    track = _same_zone(place_map, query.track)
+    return track.xy if track is not None else None
+
+
+def item_images(place_map: PlaceMap, query: Traverse, reference: Traverse | None) -> ItemImages | None:
+    """What shows the map's items: its own images, else the images of `reference`; None without either.
+
+    Raises EvaluationError where the reference's images are not like those of the query.
+    """
+    if place_map.references is not None:
+        own = place_map.references
+        return lambda items: np.asarray(own[items])
+    if reference is None:
+        return None
+    if reference.images.shape[1:] != query.images.shape[1:]:
+        raise EvaluationError(
+            f"the reference drive has images of shape {reference.images.shape[1:]}, the query of "
+            f"{query.images.shape[1:]}: give the drive that the map was learned from"
+        )
+    return lambda items: np.asarray(reference.images[_middle_images(place_map, reference, items)])
+
+
+def _middle_images(place_map: PlaceMap, reference: Traverse, items: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(n,) for each place (n,) the image of the reference drive nearest to its centre."""
+    if isinstance(place_map.places, PlaceRuns):
+        every = place_map.places.every
+        return np.minimum(items * every + every // 2, len(reference) - 1)
+    track = _same_zone(place_map, reference.track)
+    if track is None or not track.known.any():
+        raise EvaluationError("the reference drive has no positions: give a traverse with a track")
+    apart = np.hypot(*(place_map.items.position[items, None] - track.xy[None]).transpose(2, 0, 1))
+    return np.asarray(np.nanargmin(apart, axis=1), np.int64)
+
+
+def _by_place(place_map: PlaceMap, places: object, track: Track) -> Truth:
+    assert isinstance(places, PlaceGrid)
+    if place_map.items_are_places:
+        return by_places(places, track.xy)
+    return by_cells(track.xy, place_map.items.position, places.cell_m, places.origin)
+
+
+def _by_runs(place_map: PlaceMap, places: PlaceRuns, query: Traverse) -> Truth:
+    """Query and map in step: place i of the query is place i of the map."""
+    truth = by_places(places, query.xy)
+    if place_map.items_are_places:
+        return truth
+    columns = place_map.items.place
+    return dataclasses.replace(truth, block=lambda part: truth.block(part)[:, columns], n_items=len(columns))
+
+
+def _references(place_map: PlaceMap) -> Track:
+    xy, heading = place_map.drive[:, :2], place_map.drive[:, 2]
+    return Track.local(np.arange(len(xy)), xy, heading)
+
+
+def _same_zone(place_map: PlaceMap, track: Track | None) -> Track | None:
+    zone = place_map.settings.get("zone")
+    if track is None or zone is None or [track.zone, track.northern] == zone:
+        return track
+    moved: Track = track.in_zone(*zone)
+    return moved
+
+
+def _check_overlap(place_map: PlaceMap, track: Track) -> None:
+    """A query a long way from the whole map is a mistake, not a query of unseen places."""
+    known = place_map.drive[:, :2]
+    low, high = np.nanmin(known, axis=0) - MARGIN_M, np.nanmax(known, axis=0) + MARGIN_M
+    if not ((track.xy >= low) & (track.xy <= high)).all(axis=1).any():
+        raise EvaluationError(
+            f"query and map share no ground: the map spans {_span(known)}, the query {_span(track.xy)} "
+            "(metres east and north)"
+        )
+
+
+def _span(xy: NDArray[np.float64]) -> str:
+    (west, south), (east, north) = np.nanmin(xy, axis=0), np.nanmax(xy, axis=0)
+    return f"{west:.0f} to {east:.0f}, {south:.0f} to {north:.0f}"

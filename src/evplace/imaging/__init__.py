@@ -1,0 +1,1 @@
+"""Events, or frames -> windows -> images -> a traverse."""

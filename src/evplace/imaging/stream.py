@@ -1,0 +1,75 @@
+"""Packets of events in, event images out: the one path for files, live cameras and evaluation alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core.events import Events, Size
+from evplace.imaging.images import Imager, ImageSettings
+from evplace.imaging.windows import Window, WindowSettings, open_windows
+from evplace.sources.cleaning import Cleaner, CleaningSettings, Mask
+
+
+class EventImage(NamedTuple):
+    """One window as an image."""
+
+    image: NDArray[np.uint8]
+    """(h, w), or (h, w, C) where the representation has several channels."""
+    window: Window
+    """Number, time of its end and count of events."""
+
+
+class EventImages:
+    """Cleans a stream of events, cuts it into windows and makes images; packet sizes change nothing."""
+
+    def __init__(
+        self,
+        size: Size,
+        windows: WindowSettings | None = None,
+        images: ImageSettings | None = None,
+        cleaning: CleaningSettings | None = None,
+        mask: Mask | None = None,
+    ) -> None:
+        """For a sensor of `size` (width, height) in pixels; `mask` (H, W) is True at pixels to leave out."""
+        self._cleaner = Cleaner(size, cleaning, mask)
+        self._windows = open_windows(windows or WindowSettings())
+        self._imager = Imager(size, images)
+
+    @property
+    def cleaned(self) -> dict[str, int]:
+        """Reason -> events left out by the cleaning so far."""
+        return self._cleaner.dropped
+
+    def push(self, events: Events) -> Iterator[EventImage]:
+        """The images of all windows that `events` bring to their end."""
+        for piece, window in self._windows.push(self._cleaner.push(events)):
+            self._imager.add(piece)
+            if window is not None:
+                yield EventImage(self._imager.image(window.t_us), window)
+
+    def finish(self) -> Iterator[EventImage]:
+        """The image of the last window, when the stream is over."""
+        window = self._windows.finish()
+        if window is not None:
+            yield EventImage(self._imager.image(window.t_us), window)
+
+
+def event_images(
+    packets: Iterable[Events],
+    size: Size,
+    windows: WindowSettings | None = None,
+    images: ImageSettings | None = None,
+) -> Iterator[EventImage]:
+    """The images of a whole recording, one after another, in bounded memory."""
+    yield from images_of(packets, EventImages(size, windows, images))
+
+
+def images_of(packets: Iterable[Events], stream: EventImages) -> Iterator[EventImage]:
+    """The images that `stream` makes of all `packets`."""
+    for events in packets:
+        yield from stream.push(events)
+    yield from stream.finish()

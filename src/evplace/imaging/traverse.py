@@ -1,0 +1,173 @@
+"""A traverse: the images of one drive with their times and, where there is GPS, positions.
+
+On disk it is a folder of plain arrays: images.npy, t_us.npy, counts.npy, track.npy, mask.npy and
+traverse.json; images are memory-mapped, so a traverse may be larger than memory.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core.errors import InputError, TraverseError
+from evplace.core.storage import GrowingArray, new_folder, read_array, read_json, write_json
+from evplace.sources.tracks import Track
+
+FORMAT = "evplace-traverse-1"
+MARK = "traverse.json"
+"""What tells a folder that was written here from any other: only such a one is replaced."""
+
+
+@dataclass(frozen=True)
+class Traverse:
+    """The images of one drive."""
+
+    images: NDArray[np.uint8]
+    """(n, h, w), or (n, h, w, C) with several channels or colours."""
+    t_us: NDArray[np.int64]
+    """(n,) times in microseconds, never decreasing: the end of each window."""
+    counts: NDArray[np.int64]
+    """(n,) events in each window, 0 for an empty one; -1 for camera images."""
+    track: Track | None = None
+    """Where each image was taken, NaN where there is no fix; None without GPS."""
+    info: dict[str, Any] = field(default_factory=dict)
+    """Where it comes from: source, sensor, the settings of windows and images, what was dropped."""
+    mask: NDArray[np.bool_] | None = None
+    """(H, W) True at the sensor's pixels whose events were left out; None where all were taken."""
+
+    def __post_init__(self) -> None:
+        if not len(self.images):
+            raise TraverseError("a traverse without images: there is nothing to learn or to localise")
+        lengths = {len(self.images), len(self.t_us), len(self.counts)}
+        lengths |= {len(self.track.t_us)} if self.track is not None else set()
+        if len(lengths) > 1:
+            raise TraverseError(f"images, times, counts and track must be equally many, these are {lengths}")
+
+    def __len__(self) -> int:
+        return len(self.images)
+
+    def __getitem__(self, part: slice) -> Traverse:
+        """A stretch of the drive; images stay views."""
+        track = self.track.at(self.t_us[part]) if self.track is not None else None
+        return Traverse(self.images[part], self.t_us[part], self.counts[part], track, self.info, self.mask)
+
+    @property
+    def xy(self) -> NDArray[np.float64]:
+        """(n, 2) easting and northing in metres, NaN where there is no fix."""
+        return self.track.xy if self.track is not None else np.full((len(self), 2), np.nan)
+
+    def save(self, path: str | Path, overwrite: bool = False) -> None:
+        """Write the folder `path`; OutputError where it exists or cannot be written."""
+        with new_traverse(path, self.info, overwrite) as writer:
+            for image, t_us, count in zip(self.images, self.t_us, self.counts, strict=True):
+                writer.add(image, int(t_us), int(count))
+            writer.track, writer.mask = self.track, self.mask
+
+    @classmethod
+    def load(cls, path: str | Path) -> Traverse:
+        """The traverse in the folder `path`; TraverseError where it is none or is damaged."""
+        folder = Path(path)
+        try:
+            info = read_json(folder / MARK, f"the traverse {folder}")
+            if info.get("format") != FORMAT:
+                raise TraverseError(
+                    f"{folder} is no traverse of this version: its format is {info.get('format')}"
+                )
+            images = read_array(folder / "images.npy", f"the traverse {folder}", memory_mapped=True)
+            t_us = read_array(folder / "t_us.npy", f"the traverse {folder}")
+            counts = read_array(folder / "counts.npy", f"the traverse {folder}")
+            track = _load_track(folder, t_us, info.get("track"))
+            masked = (folder / "mask.npy").exists()
+            mask = read_array(folder / "mask.npy", f"the traverse {folder}") if masked else None
+        except TraverseError:
+            raise
+        except InputError as error:
+            raise TraverseError(str(error)) from error
+        return cls(images, t_us, counts, track, info["info"], mask)
+
+
+class TraverseWriter:
+    """Takes one image after another."""
+
+    def __init__(self, folder: Path, info: Mapping[str, Any]) -> None:
+        """Write into `folder`, which exists; see `new_traverse`."""
+        self.track: Track | None = None
+        """Where each image was taken: set it before the end."""
+        self.mask: NDArray[np.bool_] | None = None
+        """(H, W) True at the pixels whose events were left out."""
+        self.info = dict(info)
+        """Saved at the end."""
+        self.t_us: list[int] = []
+        """Times of the images so far."""
+        self._folder = folder
+        self._counts: list[int] = []
+        self._images: GrowingArray | None = None
+
+    def add(self, image: NDArray[np.uint8], t_us: int, count: int = -1) -> None:
+        """Add an image (h, w) or (h, w, C), its time and its count of events (-1 for a camera image)."""
+        if self._images is None:
+            self._images = GrowingArray(self._folder / "images.npy", np.uint8, image.shape)
+        self._images.append(image)
+        self.t_us.append(t_us)
+        self._counts.append(count)
+
+    def close(self) -> None:
+        """Write what is left; TraverseError where no image came."""
+        if self._images is None:
+            raise TraverseError("no image came: the recording holds no events, or the folder no images")
+        self._images.close()
+        np.save(self._folder / "t_us.npy", np.array(self.t_us, np.int64))
+        np.save(self._folder / "counts.npy", np.array(self._counts, np.int64))
+        if self.mask is not None:
+            np.save(self._folder / "mask.npy", self.mask)
+        zone = None
+        if self.track is not None:
+            _save_track(self._folder, self.track)
+            zone = {"zone": self.track.zone, "northern": self.track.northern}
+        write_json(self._folder / MARK, {"format": FORMAT, "track": zone, "info": self.info})
+
+    def discard(self) -> None:
+        """Let go of a traverse that will not be used; harmless after `close`."""
+        if self._images is not None:
+            self._images.discard()
+
+
+@contextlib.contextmanager
+def new_traverse(
+    path: str | Path, info: Mapping[str, Any], overwrite: bool = False
+) -> Iterator[TraverseWriter]:
+    """A writer for the folder `path`, which appears whole when the block ends well."""
+    with new_folder(path, overwrite, MARK) as folder:
+        writer = TraverseWriter(folder, info)
+        try:
+            yield writer
+            writer.close()
+        finally:
+            writer.discard()
+
+
+def _save_track(folder: Path, track: Track) -> None:
+    columns: Iterable[NDArray[np.float64]] = (
+        track.latitude,
+        track.longitude,
+        track.easting,
+        track.northing,
+        track.heading_deg,
+    )
+    np.save(folder / "track.npy", np.stack(list(columns), axis=1))
+
+
+def _load_track(folder: Path, t_us: NDArray[np.int64], zone: dict[str, Any] | None) -> Track | None:
+    if zone is None:
+        return None
+    columns = read_array(folder / "track.npy", f"the traverse {folder}")
+    if columns.shape != (len(t_us), 5):
+        raise TraverseError(f"{folder} is damaged: its track is {columns.shape} for {len(t_us)} images")
+    latitude, longitude, easting, northing, heading = np.ascontiguousarray(columns.T)
+    return Track(t_us, latitude, longitude, easting, northing, heading, zone["zone"], zone["northern"])

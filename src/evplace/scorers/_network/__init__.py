@@ -1,0 +1,1 @@
+"""The paper's network: its layers, its training, its ONNX graph."""

@@ -1,0 +1,1 @@
+"""Where a drive comes from: recordings, tracks, films, simulated events; and back to files."""

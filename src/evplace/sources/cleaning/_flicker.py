@@ -1,0 +1,198 @@
+"""Lamps: where and how strongly they flicker, and a filter against it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from evplace.core.errors import SettingsError
+from evplace.core.events import Events, Size
+from evplace.sources.cleaning._pixels import Counts, Mask, check_size, only
+
+MAINS_HZ = (50, 60, 100, 120, 200, 240)
+"""Where lamps flicker: mains of 50 and 60 Hz, twice that, and one harmonic."""
+
+_PHASES = 256
+"""Steps of a full turn in the flicker meter's table: 8 bits."""
+
+_MIN_PAIRS = 1000
+"""Below this the flicker of a region is not known: chance alone gives 1 / sqrt(pairs)."""
+
+
+class FlickerMeter:
+    """How much of each region's events comes and goes with a lamp, for each of `frequencies_hz`.
+
+    Within windows of `window_us`, events as +1 (brighter) and -1 (darker) are summed with the phase of the
+    frequency. The squared sum, less what single events give, over the number of pairs is the mean agreement
+    of two events: 0 for any times without order, 1 for a perfect beat. Short bursts, as of a passing edge,
+    agree at all frequencies; a lamp only at its own. So the mean at two windows' steps beside the
+    frequency, where a pure beat gives nothing, is taken off: a comb.
+    """
+
+    def __init__(
+        self,
+        size: Size,
+        frequencies_hz: Sequence[int] = MAINS_HZ,
+        region: int = 16,
+        window_us: int = 250_000,
+    ) -> None:
+        beside = 2_000_000 // max(window_us, 1)
+        if region < 1 or window_us < 1 or min(frequencies_hz, default=0) <= beside:
+            raise SettingsError(
+                f"regions of {region} pixels, windows of {window_us} us, frequencies {list(frequencies_hz)} "
+                f"are impossible: frequencies are whole numbers above {beside} Hz for such a window"
+            )
+        self.size, self.region, self.window_us = size, region, window_us
+        teeth = [tooth for f in frequencies_hz for tooth in (f, f - beside, f + beside)]
+        self._turns = np.array([-(-(tooth << 64) // 1_000_000) for tooth in teeth], np.uint64)
+        self._grid = (-(-size[1] // region), -(-size[0] // region))
+        regions = self._grid[0] * self._grid[1]
+        self._row = np.arange(size[1]) // region * self._grid[1]
+        self._column = np.arange(size[0]) // region
+        self._sums = np.zeros((regions, 2, len(teeth)))
+        self._events = np.zeros(regions, np.int64)
+        self._power = np.zeros((regions, len(teeth)))
+        self._pairs = np.zeros(regions)
+        self._start_us = np.full(1, np.iinfo(np.int64).min)
+        turn = np.arange(_PHASES) * (2 * np.pi / _PHASES)
+        self._table = np.stack([np.cos(turn), np.sin(turn)])
+
+    def push(self, events: Events) -> None:
+        """Take the next packet."""
+        check_size(events, self.size)
+        if len(events) and self._start_us[0] == np.iinfo(np.int64).min:
+            self._start_us[0] = events.t_us[0]
+        _beat(
+            events.t_us, events.x, events.y, events.p, self._row, self._column, self.window_us,
+            self._turns, self._table, self._start_us, self._sums, self._events, self._power, self._pairs,
+        )  # fmt: skip
+
+    def pairs(self) -> NDArray[np.float64]:
+        """(region rows, region columns) pairs of events compared: chance alone gives 1 / sqrt(pairs)."""
+        return self._pairs.reshape(self._grid).copy()
+
+    def strengths(self) -> NDArray[np.float64]:
+        """(region rows, region columns, frequencies) 0 to 1, over all complete windows.
+
+        NaN where a region's events make under 1000 pairs.
+        """
+        pairs = np.where(self._pairs >= _MIN_PAIRS, self._pairs, np.nan)[:, None]
+        agreement = (self._power / pairs).reshape(len(pairs), -1, 3)
+        comb = agreement[:, :, 0] - agreement[:, :, 1:].mean(axis=2)
+        return np.asarray(np.clip(comb, 0, 1).reshape(*self._grid, -1), np.float64)
+
+
+class FlickerFilter:
+    """Drops the events of pixels that brighten again and again with the period of a lamp.
+
+    A cycle of a pixel begins with the first event brighter after one darker. After `cycles` cycles whose
+    lengths are all within `tolerance` of the period, its events are dropped, until a cycle is shorter or
+    longer, or fails to come. `where` (H, W) limits the filter to regions that the meter found to flicker.
+    """
+
+    def __init__(
+        self,
+        size: Size,
+        frequency_hz: float,
+        tolerance: float = 0.1,
+        cycles: int = 3,
+        where: Mask | None = None,
+    ) -> None:
+        if not (frequency_hz > 0 and 0 < tolerance < 1 and cycles >= 1):
+            raise SettingsError(
+                f"no filter for {frequency_hz} Hz, tolerance {tolerance}, {cycles} cycles: give a frequency "
+                "above 0, a tolerance between 0 and 1, and at least 1 cycle"
+            )
+        shape = (size[1], size[0])
+        if where is not None and where.shape != shape:
+            raise SettingsError(f"where has the shape {where.shape}, the sensor {shape}")
+        self.size, self.cycles = size, cycles
+        self._where = np.ones(shape, np.bool_) if where is None else where
+        self._bounds_us = (1e6 / frequency_hz * (1 - tolerance), 1e6 / frequency_hz * (1 + tolerance))
+        self._rise_us = np.full(shape, np.iinfo(np.int64).min // 2)
+        self._brighter = np.ones(shape, np.bool_)
+        self._streak = np.zeros(shape, np.int32)
+
+    def push(self, events: Events) -> Events:
+        """The events that are kept, of the next packet."""
+        check_size(events, self.size)
+        keep = _aperiodic(
+            events.t_us, events.x, events.y, events.p, self._where, *self._bounds_us, self.cycles,
+            self._rise_us, self._brighter, self._streak,
+        )  # fmt: skip
+        return only(events, keep)
+
+
+@njit(cache=True)
+def _beat(
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: Mask,
+    row: Counts,
+    column: Counts,
+    window_us: int,
+    turns: NDArray[np.uint64],
+    table: NDArray[np.float64],
+    start_us: Counts,
+    sums: NDArray[np.float64],
+    events: Counts,
+    power: NDArray[np.float64],
+    pairs: NDArray[np.float64],
+) -> None:
+    """Sum signed phases in the window from start_us[0]; a complete window goes to power and pairs.
+
+    `turns` are turns a microsecond, in 64 bits behind the point: products keep their fraction alone, and its
+    8 highest bits are the step of the table. `row` + `column` is the region.
+    """
+    for i in range(len(t_us)):
+        if t_us[i] - start_us[0] >= window_us:
+            for place in range(len(events)):
+                n = events[place]
+                pairs[place] += n * (n - 1.0)
+                for k in range(len(turns)):
+                    power[place, k] += sums[place, 0, k] ** 2 + sums[place, 1, k] ** 2 - n
+            sums[:] = 0.0
+            events[:] = 0
+            start_us[0] += (t_us[i] - start_us[0]) // window_us * window_us
+        place = row[y[i]] + column[x[i]]
+        events[place] += 1
+        sign = 1.0 if p[i] else -1.0
+        since = np.uint64(t_us[i] - start_us[0])
+        real, imaginary = sums[place, 0], sums[place, 1]
+        for k in range(len(turns)):
+            phase = (since * turns[k]) >> np.uint64(56)
+            real[k] += sign * table[0, phase]
+            imaginary[k] += sign * table[1, phase]
+
+
+@njit(cache=True)
+def _aperiodic(
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: Mask,
+    where: Mask,
+    shortest_us: float,
+    longest_us: float,
+    cycles: int,
+    rise_us: Counts,
+    brighter: Mask,
+    streak: NDArray[np.int32],
+) -> Mask:
+    keep = np.empty(len(t_us), np.bool_)
+    for i in range(len(t_us)):
+        row, column = y[i], x[i]
+        since = t_us[i] - rise_us[row, column]
+        if since > longest_us:
+            streak[row, column] = 0
+        if p[i] and not brighter[row, column]:
+            regular = shortest_us <= since <= longest_us
+            streak[row, column] = streak[row, column] + 1 if regular else 0
+            rise_us[row, column] = t_us[i]
+        brighter[row, column] = p[i]
+        keep[i] = streak[row, column] < cycles or not where[row, column]
+    return keep

@@ -1,0 +1,91 @@
+"""What Prophesee's files share: the text header, and words read in blocks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.events import Size
+
+_LINE = re.compile(rb"%[ \t]?[\x09\x20-\x7e]*\r?\n")
+
+
+class Header(NamedTuple):
+    """The text lines that start a file."""
+
+    fields: dict[str, str]
+    """First word of each line, in small letters -> the rest of the line."""
+    length: int
+    """Bytes to the first that is data."""
+
+
+def header(head: bytes) -> Header:
+    """The header in the first bytes of a file: lines that start with a percent sign, up to `% end`."""
+    fields: dict[str, str] = {}
+    position = 0
+    while (line := _LINE.match(head, position)) is not None:
+        position = line.end()
+        words = line.group().decode("ascii")[1:].split(maxsplit=1)
+        if words:
+            fields[words[0].lower()] = words[1].strip() if len(words) > 1 else ""
+        if words == ["end"]:
+            break
+    return Header(fields, position)
+
+
+def evt_version(fields: dict[str, str]) -> str:
+    """The encoding that a raw header states, such as "2.0" or "3"; empty where it states none."""
+    if "evt" in fields:
+        return fields["evt"]
+    stated = re.match(r"EVT(\d+)", fields.get("format", ""))
+    return stated.group(1) if stated else ""
+
+
+def stated_size(fields: dict[str, str]) -> Size | None:
+    """(width, height) from whichever of the usual lines there is."""
+    pairs = (
+        re.search(r"width=(\d+).*height=(\d+)", fields.get("format", "")),
+        re.search(r"(\d+)\s*x\s*(\d+)", fields.get("geometry", "")),
+        re.search(r"^(\d+) (\d+)$", f"{fields.get('width', '')} {fields.get('height', '')}"),
+    )
+    found = next((pair for pair in pairs if pair), None)
+    if found is None:
+        return None
+    width, height = int(found.group(1)), int(found.group(2))
+    if not (0 < width <= 1 << 16 and 0 < height <= 1 << 16):
+        raise RecordingError(f"the header states a sensor of {width}x{height} pixels: give the size")
+    return width, height
+
+
+def start_us(fields: dict[str, str]) -> int:
+    """The time in microseconds that all others count from, where the header states one (faery writes it)."""
+    stated = fields.get("t0", "0")
+    return int(stated) if re.fullmatch(r"\d{1,18}", stated) else 0
+
+
+def words(path: Path, offset: int, kind: DTypeLike, count: int) -> Iterator[NDArray[Any]]:
+    """The data from byte `offset` on as words of type `kind`, at most `count` at a time.
+
+    Raises DamagedRecordingError, after the last whole word, where the file ends inside a word.
+    """
+    width = np.dtype(kind).itemsize
+    with path.open("rb") as file:
+        file.seek(offset)
+        while data := file.read(count * width):
+            whole = len(data) // width
+            if whole:
+                yield np.frombuffer(data, kind, whole)
+            if len(data) % width:
+                raise DamagedRecordingError(f"{path} is cut off inside a word, at byte {file.tell()}")
+
+
+def head_of(path: Path, length: int = 1 << 16) -> bytes:
+    """The first bytes of a file."""
+    with path.open("rb") as file:
+        return file.read(length)

@@ -1,0 +1,204 @@
+"""Event messages of ROS 1 and ROS 2, whatever bag they stand in.
+
+Read are event_camera_msgs/EventPacket and dvs_msgs/EventArray (also under their older names). Serialisation:
+ROS 1 packs all fields; ROS 2 (CDR) aligns each to its own width and ends text with a zero byte.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.sources.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Encoding
+from evplace.sources.readers._source import Block, Source, gathered, joined
+
+PACKETS = ("event_camera_msgs/EventPacket", "event_array_msgs/EventArray")
+ARRAYS = ("dvs_msgs/EventArray", "prophesee_event_msgs/EventArray")
+PACKED = np.dtype([("x", "<u2"), ("y", "<u2"), ("s", "<u4"), ("ns", "<u4"), ("p", "u1")])
+"""An event of an EventArray in ROS 1."""
+ALIGNED = np.dtype(
+    {"names": ["x", "y", "s", "ns", "p"], "formats": ["<u2", "<u2", "<u4", "<u4", "u1"],
+     "offsets": [0, 2, 6, 10, 14], "itemsize": 15}
+)  # fmt: skip
+"""An event of an EventArray in ROS 2 that starts two bytes off a multiple of four; the next is STEP away."""
+STEP = 16
+
+
+Bytes = bytes | memoryview
+"""Views, where a message is a part of something larger: it is not copied before it is decoded."""
+
+
+class Message(NamedTuple):
+    """One message of a bag."""
+
+    topic: str
+    kind: str
+    """The type without `/msg`, for example "dvs_msgs/EventArray"."""
+    data: Bytes
+
+
+class Fields:
+    """Takes the fields of a serialised message one after the other; struct.error where it is too short."""
+
+    def __init__(self, data: Bytes, aligned: bool) -> None:
+        self.data = data
+        self.position = 4 if aligned else 0
+        self._aligned = aligned
+        if aligned and data[1:2] != b"\x01":
+            raise ValueError("its numbers stand high byte first")
+
+    def take(self, kind: str) -> int:
+        """One number of the struct type `kind`."""
+        width = struct.calcsize(kind)
+        if self._aligned:
+            self.position += -(self.position - 4) % width
+        value: int = struct.unpack_from("<" + kind, self.data, self.position)[0]
+        self.position += width
+        return value
+
+    def raw(self) -> Bytes:
+        """A counted run of bytes."""
+        length = self.take("I")
+        start = self.position
+        if start + length > len(self.data):
+            raise ValueError(f"it claims {length} bytes")
+        self.position += length
+        return self.data[start : start + length]
+
+    def header(self) -> int:
+        """The std_msgs/Header; returns its stamp in nanoseconds."""
+        if not self._aligned:
+            self.take("I")
+        seconds, nanoseconds = self.take("I"), self.take("I")
+        self.raw()
+        return seconds * 1_000_000_000 + nanoseconds
+
+
+def source(path: Path, messages: Callable[[], Iterator[Message]], aligned: bool) -> Source:
+    """The first topic with events in a bag; RecordingError where there is none that can be read."""
+    other: set[str] = set()
+    try:
+        for message in messages():
+            if message.kind in PACKETS + ARRAYS:
+                return _opened(path, messages, message, aligned)
+            other.add(f"{message.topic} ({message.kind})")
+    except DamagedRecordingError as error:
+        raise RecordingError(f"{error}; no event came before") from error
+    found = ", ".join(sorted(other)) or "no message at all"
+    raise RecordingError(f"{path} holds no event messages ({', '.join(PACKETS + ARRAYS)}): it holds {found}")
+
+
+def _opened(path: Path, messages: Callable[[], Iterator[Message]], first: Message, aligned: bool) -> Source:
+    try:
+        fields = Fields(first.data, aligned)
+        fields.header()
+        height, width = fields.take("I"), fields.take("I")
+    except (struct.error, ValueError) as error:
+        raise RecordingError(f"{path}: the first event message is damaged: {error}") from error
+    size = (width, height) if 0 < width <= 1 << 16 and 0 < height <= 1 << 16 else None
+    notes = []
+    if first.kind in PACKETS:
+        notes.append("times of a camera's own clock are moved: the first event has the stamp of its message")
+
+    def blocks() -> Iterator[Block]:
+        decode = _Packets(aligned) if first.kind in PACKETS else _Arrays(aligned)
+        return gathered(_decoded(path, messages, first.topic, decode))
+
+    return Source(size, blocks, notes)
+
+
+def _decoded(
+    path: Path, messages: Callable[[], Iterator[Message]], topic: str, decode: Callable[[Bytes], Block]
+) -> Iterator[Block]:
+    for number, message in enumerate(messages()):
+        if message.topic == topic:
+            try:
+                yield decode(message.data)
+            except (struct.error, ValueError) as error:
+                raise DamagedRecordingError(f"{path}: message {number} is damaged: {error}") from error
+
+
+class _Packets:
+    """event_camera_msgs/EventPacket: what the camera sent, in the encoding that it used."""
+
+    def __init__(self, aligned: bool) -> None:
+        self._aligned = aligned
+        self._encodings: dict[str, Encoding] = {}
+        self._shift_us: int | None = None
+
+    def __call__(self, data: Bytes) -> Block:
+        fields = Fields(data, self._aligned)
+        stamp_ns = fields.header()
+        for kind in "IIQ":  # height, width, seq
+            fields.take(kind)
+        base_ns = fields.take("Q")
+        name = bytes(fields.raw()).rstrip(b"\0").decode("ascii", "replace")
+        fields.take("B")
+        block = self._encoding(name)(fields.raw(), base_ns)
+        if self._shift_us is None and len(block.t_us):
+            self._shift_us = 0 if name in SINCE_EPOCH else stamp_ns // 1000 - int(block.t_us[0])
+        return block._replace(t_us=block.t_us + (self._shift_us or 0))
+
+    def _encoding(self, name: str) -> Encoding:
+        if name not in ENCODINGS:
+            raise ValueError(f"its encoding '{name}' cannot be read: known are {', '.join(ENCODINGS)}")
+        if name not in self._encodings:
+            self._encodings[name] = ENCODINGS[name]()
+        return self._encodings[name]
+
+
+class _Arrays:
+    """dvs_msgs/EventArray: one struct an event, with a time stamp of its own."""
+
+    def __init__(self, aligned: bool) -> None:
+        self._aligned = aligned
+
+    def __call__(self, data: Bytes) -> Block:
+        fields = Fields(data, self._aligned)
+        fields.header()
+        fields.take("I"), fields.take("I")
+        count = fields.take("I")
+        start = fields.position
+        if not self._aligned:
+            return _block(np.frombuffer(data, PACKED, count, start))
+        if count and start % 4 == 0:  # only the first event can start there: it is two bytes shorter
+            first = np.frombuffer(data, PACKED, 1, start)
+            return joined([_block(first), _block(_aligned_events(data, count - 1, start + 14))])
+        return _block(_aligned_events(data, count, start))
+
+
+def _aligned_events(data: Bytes, count: int, start: int) -> NDArray[Any]:
+    """`count` events of ROS 2; the last one lacks the byte that fills it up."""
+    if start + count * STEP > len(data) + 1:
+        raise ValueError(f"it claims {count} events")
+    return np.ndarray((count,), ALIGNED, data, min(start, len(data)), (STEP,))
+
+
+def _block(events: NDArray[Any]) -> Block:
+    count = len(events)
+    t_us, x, y = np.empty(count, np.int64), np.empty(count, np.uint16), np.empty(count, np.uint16)
+    p = np.empty(count, np.bool_)
+    _split(events, t_us, x, y, p)
+    return Block(t_us, x, y, p)
+
+
+@njit(cache=True)
+def _split(
+    events: NDArray[Any],
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.bool_],
+) -> None:
+    """Fill the arrays from structs of either layout."""
+    for i in range(len(events)):
+        event = events[i]
+        t_us[i] = np.int64(event["s"]) * 1_000_000 + np.int64(event["ns"]) // 1000
+        x[i], y[i], p[i] = event["x"], event["y"], event["p"] != 0

@@ -1,0 +1,87 @@
+"""What a reader file gives and gets: see the docstring of this room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core.events import Size
+
+
+@dataclass(frozen=True, slots=True)
+class Hints:
+    """What the caller knows better than the file."""
+
+    size: Size | None = None
+    """(width, height) of the sensor; None: from the header, else from the data."""
+    time_unit: str | None = None
+    """"s", "ms", "us" or "ns"; None: from the file. Only formats without a unit of their own ask for it."""
+
+
+class Block(NamedTuple):
+    """Events as decoded, not yet checked; the arrays are new, so that callers may keep them."""
+
+    t_us: NDArray[np.int64]
+    x: NDArray[np.uint16]
+    y: NDArray[np.uint16]
+    p: NDArray[np.bool_]
+    untimed: int = 0
+    """Events left out because no time had been given yet when they came."""
+    back_us: int = 0
+    """How far the furthest of the events that the checks left out as backwards lay back."""
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """An opened recording of one format."""
+
+    size: Size | None
+    """(width, height) that the file states, None where it states none."""
+    blocks: Callable[[], Iterator[Block]]
+    """Starts reading anew; raises DamagedRecordingError at a fault, after every good block."""
+    notes: list[str] = field(default_factory=list)
+    """Guesses that were made, one plain sentence each."""
+    turn_us: int = 0
+    """Microseconds after which the file's clock starts anew, which `blocks` makes good; 0: it never does."""
+    zero_us: int = 0
+    """The time at which a clock that turns read 0."""
+
+
+def gathered(blocks: Iterator[Block], events: int = 1 << 15) -> Iterator[Block]:
+    """Small blocks joined into blocks of at least `events` events; what is held comes out before a fault.
+
+    Much larger ones would not stay in the processor's cache until they are checked.
+    """
+    held: list[Block] = []
+    count = 0
+    try:
+        for block in blocks:
+            held.append(block)
+            count += len(block.t_us)
+            if count >= events:
+                yield joined(held)
+                held, count = [], 0
+    except Exception:
+        if held:
+            yield joined(held)
+        raise
+    if held:
+        yield joined(held)
+
+
+def joined(blocks: list[Block]) -> Block:
+    """The blocks as one, in the order given."""
+    if len(blocks) == 1:
+        return blocks[0]
+    return Block(
+        np.concatenate([block.t_us for block in blocks]),
+        np.concatenate([block.x for block in blocks]),
+        np.concatenate([block.y for block in blocks]),
+        np.concatenate([block.p for block in blocks]),
+        sum(block.untimed for block in blocks),
+        max(block.back_us for block in blocks),
+    )

@@ -1,0 +1,77 @@
+"""Prophesee DAT, versions 1 and 2: 8 bytes an event, of which 4 are the time in microseconds.
+
+Layout: Prophesee, "DAT file format". The time wraps every 71.6 min.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core.errors import RecordingError
+from evplace.sources.readers._clock import clock, unwrap_32
+from evplace.sources.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
+from evplace.sources.readers._source import Block, Hints, Source
+
+ABOUT = "Prophesee DAT file"
+CHANGE_EVENTS = (0x00, 0x0C)
+"""Event types that hold a column, a row and a polarity."""
+KINDS = (*CHANGE_EVENTS, 0x0E, 0x28)
+"""All event types: the last two are triggers."""
+RECORD = np.dtype([("t", "<u4"), ("data", "<u4")])
+EVENTS = 1 << 16
+"""Events decoded at a time; with many more the processor's cache would not hold the steps in between."""
+
+
+def matches(path: Path, head: bytes) -> bool:
+    """Whether a header that names no raw encoding is followed by a DAT event type and a size of 8 bytes."""
+    fields, start = header(head)
+    after = head[start : start + 2]
+    return start > 0 and not evt_version(fields) and len(after) == 2 and after[0] in KINDS and after[1] == 8
+
+
+def read(path: Path, hints: Hints) -> Source:
+    """The header; RecordingError where the file holds no change events or states an unknown version."""
+    head = head_of(path)
+    fields, start = header(head)
+    if not head[start : start + 1] or head[start] not in CHANGE_EVENTS:
+        raise RecordingError(f"{path} is a DAT file without change events: it may hold triggers only")
+    version = fields.get("version", "")
+    if version not in ("", "1", "2"):
+        raise RecordingError(f"{path} is a DAT file of version '{version}': known are 1 and 2")
+    notes = [] if version else ["the DAT header states no version: 2 is taken"]
+    zero_us = start_us(fields)
+    blocks = partial(_blocks, path, start + 2, version == "1", zero_us)
+    return Source(stated_size(fields), blocks, notes, 1 << 32, zero_us)
+
+
+def _blocks(path: Path, start: int, first_version: bool, shift_us: int) -> Iterator[Block]:
+    state = None
+    for run in words(path, start, RECORD, EVENTS):
+        if state is None:
+            state = clock(int(run["t"][0]))
+        t_us = unwrap_32(state, np.ascontiguousarray(run["t"]))
+        yield Block(
+            t_us + shift_us if shift_us else t_us, *(_version_1 if first_version else _version_2)(run["data"])
+        )
+
+
+def _version_1(data: NDArray[np.uint32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    return (
+        (data & 0x1FF).astype(np.uint16),
+        (data >> 9 & 0xFF).astype(np.uint16),
+        (data >> 17 & 1).astype(np.bool_),
+    )
+
+
+def _version_2(data: NDArray[np.uint32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    return (
+        (data & 0x3FFF).astype(np.uint16),
+        (data >> 14 & 0x3FFF).astype(np.uint16),
+        (data >> 28).astype(np.bool_),
+    )

@@ -1,0 +1,80 @@
+"""Prophesee raw, EVT 2.0: 32-bit words, one an event, with 6 bits of time below 28 bits sent now and then.
+
+Layout: Prophesee, "EVT 2.0 format". The time is 34 bits of microseconds and wraps every 4.77 h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from evplace.sources.readers._clock import clock, unwrap
+from evplace.sources.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
+from evplace.sources.readers._source import Block, Hints, Source
+
+ABOUT = "Prophesee raw file, EVT 2.0"
+WORDS = 1 << 19
+"""Words decoded at a time."""
+
+
+def matches(path: Path, head: bytes) -> bool:
+    """Whether the raw header names EVT 2.0 (2.1 is another format)."""
+    return evt_version(header(head).fields) in ("2", "2.0")
+
+
+def read(path: Path, hints: Hints) -> Source:
+    """The header; RecordingError where it states an impossible size."""
+    fields, start = header(head_of(path))
+    zero_us = start_us(fields)
+    blocks = partial(_blocks, path, start, zero_us)
+    return Source(stated_size(fields), blocks, turn_us=1 << 34, zero_us=zero_us)
+
+
+def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:
+    state, clock_state = np.zeros(3, np.int64), clock()
+    for run in words(path, start, "<u4", WORDS):
+        t_us, x, y = (
+            np.empty(len(run), np.int64),
+            np.empty(len(run), np.uint16),
+            np.empty(len(run), np.uint16),
+        )
+        p = np.empty(len(run), np.bool_)
+        state[2] = 0
+        count = _decode(run, state, clock_state, shift_us, t_us, x, y, p)
+        yield Block(t_us[:count], x[:count], y[:count], p[:count], int(state[2]))
+
+
+@njit(cache=True)
+def _decode(
+    run: NDArray[np.uint32],
+    state: NDArray[np.int64],
+    clock_state: NDArray[np.int64],
+    shift_us: int,
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.bool_],
+) -> int:
+    """Fill the arrays; `state` is the time above the 6 low bits, whether it is known, and events without."""
+    high, timed, untimed, count = state[0], state[1] != 0, 0, 0
+    for word in run:
+        kind = word >> 28
+        if kind <= 1:
+            if timed:
+                t_us[count] = shift_us + (high << 6 | np.int64(word >> 22 & 0x3F))
+                x[count], y[count], p[count] = word >> 11 & 0x7FF, word & 0x7FF, kind == 1
+                count += 1
+            else:
+                untimed += 1
+        elif kind == 0x8:
+            value = np.int64(word & 0xFFFFFFF)
+            if not timed:
+                clock_state[0], timed = value, True
+            high = unwrap(clock_state, value, 0xFFFFFFF)
+    state[0], state[1], state[2] = high, timed, untimed
+    return count

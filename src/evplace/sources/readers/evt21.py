@@ -1,0 +1,100 @@
+"""Prophesee raw, EVT 2.1: 64-bit words, each up to 32 neighbouring events of one row, time and polarity.
+
+Layout: Prophesee, "EVT 2.1 format" (the little-endian one). The time is 34 bits of microseconds and wraps
+every 4.77 h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from evplace.sources.readers._clock import clock, unwrap
+from evplace.sources.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
+from evplace.sources.readers._source import Block, Hints, Source
+
+ABOUT = "Prophesee raw file, EVT 2.1"
+WORDS = 1 << 17
+"""Words decoded at a time; a word gives 32 events at most."""
+POSITION = np.zeros(37, np.int64)
+"""2 ** n modulo 37 -> n: the powers of two up to 2 ** 31 all leave another rest."""
+POSITION[[(1 << n) % 37 for n in range(32)]] = range(32)
+
+
+def matches(path: Path, head: bytes) -> bool:
+    """Whether the raw header names EVT 2.1."""
+    return evt_version(header(head).fields) in ("2.1", "21")
+
+
+def read(path: Path, hints: Hints) -> Source:
+    """The header; RecordingError where it states an impossible size."""
+    fields, start = header(head_of(path))
+    zero_us = start_us(fields)
+    blocks = partial(_blocks, path, start, zero_us)
+    return Source(stated_size(fields), blocks, turn_us=1 << 34, zero_us=zero_us)
+
+
+def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:
+    state, clock_state = np.zeros(3, np.int64), clock()
+    for run in words(path, start, "<u8", WORDS):
+        room = _events_in(run)
+        t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
+        p = np.empty(room, np.bool_)
+        state[2] = 0
+        count = _decode(run, state, clock_state, shift_us, t_us, x, y, p)
+        yield Block(t_us[:count], x[:count], y[:count], p[:count], int(state[2]))
+
+
+@njit(cache=True)
+def _events_in(run: NDArray[np.uint64]) -> int:
+    """Events that the words give, whether or not their time is known."""
+    count = 0
+    for word in run:
+        if word >> np.uint64(60) <= 1:
+            bits = np.int64(word & np.uint64(0xFFFFFFFF))
+            while bits:
+                bits &= bits - 1
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def _decode(
+    run: NDArray[np.uint64],
+    state: NDArray[np.int64],
+    clock_state: NDArray[np.int64],
+    shift_us: int,
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.bool_],
+) -> int:
+    """Fill the arrays; `state` is the time above the 6 low bits, whether it is known, and events without."""
+    high, timed, untimed, count = state[0], state[1] != 0, 0, 0
+    for unsigned in run:
+        kind = unsigned >> np.uint64(60)
+        word = np.int64(unsigned & np.uint64(0x0FFFFFFFFFFFFFFF))
+        if kind <= 1:
+            time = shift_us + (high << 6 | word >> 54 & 0x3F)
+            bits = word & 0xFFFFFFFF
+            while bits:
+                lowest = bits & -bits
+                bits ^= lowest
+                if timed:
+                    t_us[count], x[count] = time, (word >> 43 & 0x7FF) + POSITION[lowest % 37]
+                    y[count], p[count] = word >> 32 & 0x7FF, kind == 1
+                    count += 1
+                else:
+                    untimed += 1
+        elif kind == 0x8:
+            value = word >> 32 & 0xFFFFFFF
+            if not timed:
+                clock_state[0], timed = value, True
+            high = unwrap(clock_state, value, 0xFFFFFFF)
+    state[0], state[1], state[2] = high, timed, untimed
+    return count

@@ -1,0 +1,114 @@
+"""ROS 2 bags in MCAP files: a folder with its metadata.yaml, or one .mcap file. Checksums are verified.
+
+Layout: the MCAP specification (mcap.dev). Records are read from the start; the index at the end is not
+needed, so that a cut file gives all before the cut.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import zlib
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import BinaryIO
+
+from evplace.core.errors import DamagedRecordingError
+from evplace.sources.readers._ros import Bytes, Message, source
+from evplace.sources.readers._source import Hints, Source
+from evplace.sources.readers._unpack import LIMIT, UnpackError, unpack
+
+ABOUT = "ROS 2 bag (MCAP) with event messages"
+MAGIC = b"\x89MCAP0\r\n"
+FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
+"""Kinds of records that matter; the others are indexes and attachments."""
+
+
+class _Names:
+    """What schemas and channels said so far."""
+
+    def __init__(self) -> None:
+        self.kinds: dict[int, str] = {}
+        """Schema -> message type."""
+        self.channels: dict[int, tuple[str, str]] = {}
+        """Channel -> topic and message type."""
+
+
+def matches(path: Path, head: bytes) -> bool:
+    """Whether it is an MCAP file, or a folder that holds some."""
+    return head.startswith(MAGIC) or (path.is_dir() and bool(_files(path)))
+
+
+def read(path: Path, hints: Hints) -> Source:
+    """The first topic with events; RecordingError where there is none."""
+    return source(path, partial(_messages, path), aligned=True)
+
+
+def _files(path: Path) -> list[Path]:
+    """The files of a bag in the order of the numbers that end their names."""
+    files = path.glob("*.mcap") if path.is_dir() else [path]
+    return sorted(files, key=lambda file: (int((re.findall(r"(\d+)$", file.stem) or ["0"])[0]), file.name))
+
+
+def _messages(path: Path) -> Iterator[Message]:
+    for file in _files(path):
+        try:
+            with file.open("rb") as opened:
+                yield from _in_file(opened, file.stat().st_size)
+        except (struct.error, ValueError, KeyError, UnpackError) as error:
+            raise DamagedRecordingError(f"{file} breaks off: {error}") from error
+
+
+def _in_file(file: BinaryIO, size: int) -> Iterator[Message]:
+    if file.read(len(MAGIC)) != MAGIC:
+        raise ValueError("it is no MCAP file")
+    names = _Names()
+    while True:
+        kind, length = struct.unpack("<BQ", file.read(9))
+        if length > size - file.tell():
+            raise ValueError(f"a record at byte {file.tell()} claims {length} bytes")
+        if kind == FOOTER:
+            return
+        if kind not in (SCHEMA, CHANNEL, MESSAGE, CHUNK):
+            file.seek(length, 1)
+            continue
+        if length > LIMIT:
+            raise ValueError(f"a record at byte {file.tell()} claims {length} bytes")
+        data = file.read(length)
+        yield from _in_chunk(data, names) if kind == CHUNK else _taken(kind, data, names)
+
+
+def _in_chunk(data: bytes, names: _Names) -> Iterator[Message]:
+    """The messages of a chunk, once it is unpacked and its checksum is right."""
+    _, _, size, checksum = struct.unpack_from("<QQQI", data)
+    method, position = _text(data, 28)
+    length = struct.unpack_from("<Q", data, position)[0]
+    records = unpack(data[position + 8 : position + 8 + length], method or "none", min(size, LIMIT))
+    if len(records) != size or (checksum and zlib.crc32(records) != checksum):
+        raise ValueError("the checksum of a chunk is wrong")
+    position, view = 0, memoryview(records)
+    while position < len(records):
+        kind, length = struct.unpack_from("<BQ", records, position)
+        yield from _taken(kind, view[position + 9 : position + 9 + length], names)
+        position += 9 + length
+
+
+def _taken(kind: int, data: Bytes, names: _Names) -> Iterator[Message]:
+    """Remember a schema or a channel, give a message."""
+    if kind == SCHEMA:
+        names.kinds[struct.unpack_from("<H", data)[0]] = _text(data, 2)[0].replace("/msg/", "/")
+    elif kind == CHANNEL:
+        number, schema = struct.unpack_from("<HH", data)
+        topic, position = _text(data, 4)
+        coding, _ = _text(data, position)
+        kind_name = names.kinds.get(schema, "unknown")
+        names.channels[number] = topic, kind_name if coding == "cdr" else f"{kind_name} as {coding}"
+    elif kind == MESSAGE:
+        yield Message(*names.channels[struct.unpack_from("<H", data)[0]], data[22:])
+
+
+def _text(data: Bytes, position: int) -> tuple[str, int]:
+    """A counted text and the byte after it."""
+    length = struct.unpack_from("<I", data, position)[0]
+    return bytes(data[position + 4 : position + 4 + length]).decode("utf-8", "replace"), position + 4 + length

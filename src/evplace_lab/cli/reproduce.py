@@ -1,0 +1,66 @@
+"""Make the paper's Table 2 and Figure 5, the table of what it leaves open, or that of real drives.
+
+Examples:
+  evplace reproduce table2 -o out                       makes the benchmark city first: about 15 minutes
+  evplace reproduce table2 --city city -o out           with drives that `evplace city -o city` made
+  evplace reproduce figure5 --city city -o out          what table2 has trained is not trained again
+  evplace reproduce ablations --city city -o out
+  evplace reproduce real --data data -o out             real sets that lie in a folder
+  evplace reproduce table2 --city small -o quick --seeds 1 --set steps=50
+
+OUT gets NAME.json and the results; `evplace report OUT` makes a page of them. A call that was stopped goes on
+where it was when it is given again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from evplace.cli._output import print_json, print_table, progress
+from evplace.core import families as plugs
+from evplace.core import settings
+from evplace_lab.reproduction import Choice, reproduce
+
+
+@dataclass(frozen=True)
+class Args:
+    """Flags of `evplace reproduce`."""
+
+    name: tyro.conf.Positional[str]
+    """table2, figure5, ablations or real."""
+    out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
+    """The folder for the results; what is there is gone on with."""
+    city: Path | None = None
+    """Drives that `evplace city` made; without them the benchmark is made in OUT/city."""
+    data: Path | None = None
+    """For real: the folder of real sets; its recipes say which, and where in it each lies."""
+    seeds: int = 3
+    """Trainings of each network."""
+    inputs: tuple[str, ...] = ()
+    """For table2 and figure5: only these inputs, for example events colour; all if not given."""
+    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    """A setting of all trainings over the recipes', as name=value: for a quick look."""
+    workers: int | None = None
+    """Processes; one a core if not given. They do not change the result."""
+    json: bool = False
+    """Print one JSON object."""
+
+
+def run(args: Args) -> int:
+    """Run what is missing, print the tables."""
+    choice = Choice(args.seeds, settings.from_pairs(args.set), args.inputs)
+    with progress(args.name) as show:
+        document = reproduce(args.name, args.out, args.city, args.data, choice, args.workers, show)
+    if args.json:
+        print_json(document)
+        return 0
+    for table in plugs.load("reproduction", args.name).tables(document):
+        print_table(*table)
+    minutes = document["cpu_s"] / 60
+    print(f"Kept in {args.out}/{args.name}.json, {minutes:.1f} minutes of one core in all")
+    print(f"evplace report {args.out} makes a page of it")
+    return 0

@@ -1,0 +1,73 @@
+"""Images of samples as PNG inside the page, within a budget."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.evaluation import Result
+from evplace.imaging.sheets import as_shown
+
+BUDGET = 12_000_000
+"""Characters of all images in a page."""
+LEVELS = {"grey": 16, "colours": 128}
+"""Shades that a shown image keeps: enough for the eye, and half the size or less."""
+
+Shown = list[tuple[int, list[str]]]
+"""A query and its three images (query, matched, true) as data URIs; empty text where there is none."""
+
+
+def sample_images(results: Mapping[str, Result], budget: int = BUDGET) -> dict[str, Shown]:
+    """The samples of each result that has any; where all are more than `budget`, as many of each as fit."""
+    shown = {name: _of(result) for name, result in results.items() if result.samples is not None}
+    size = sum(len(source) for samples in shown.values() for _, sources in samples for source in sources)
+    if size <= budget:
+        return shown
+    share = budget / size
+    return {name: _evenly(samples, max(1, int(share * len(samples)))) for name, samples in shown.items()}
+
+
+def _of(result: Result) -> Shown:
+    samples = result.samples
+    assert samples is not None
+    true_item = np.full(len(result.judged), 0) if result.true_item is None else result.true_item
+    events = _are_events(result.settings)
+    shown = []
+    for query, images in zip(samples.query.tolist(), samples.images, strict=True):
+        there = (True, result.answers.item[query] >= 0, true_item[query] >= 0)
+        shown.append(
+            (
+                query,
+                [_source(image, events) if some else "" for image, some in zip(images, there, strict=True)],
+            )
+        )
+    return shown
+
+
+def _evenly(samples: Shown, many: int) -> Shown:
+    return [samples[at] for at in np.linspace(0, len(samples) - 1, many).astype(int)] if samples else []
+
+
+def _are_events(settings: Mapping[str, Any]) -> bool:
+    """Whether the map was made of event images."""
+    of_map = settings.get("map")
+    return isinstance(of_map, Mapping) and of_map.get("input") == "events"
+
+
+def _source(image: NDArray[np.uint8], events: bool) -> str:
+    """An image (h, w) or (h, w, C) as the address of a PNG that holds itself."""
+    from PIL import Image
+
+    shown = as_shown(image, events)
+    grey = bool(np.all(shown == shown[..., :1]))
+    picture = Image.fromarray(shown[..., 0] if grey else shown)
+    file = io.BytesIO()
+    levels = LEVELS["grey" if grey else "colours"]
+    # Pillow's median cut takes 20 times as long for a difference that is not seen at this size.
+    picture.quantize(levels, None if grey else Image.Quantize.FASTOCTREE).save(file, "PNG")
+    return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")

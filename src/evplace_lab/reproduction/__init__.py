@@ -1,0 +1,167 @@
+"""The paper's comparison on the benchmark city and on real sets: from recipes to documents.
+
+One file a table or figure; its name is what users ask for. Each holds NEEDS (city or data), `cases(drives,
+choice)` (all that must be run), `collect(drives, runs, choice)` (the document, as plain values), and
+`tables(document)` (the same for people). What was run is kept by its settings in the output folder, so that a
+second call, another table or a killed call runs only what is missing.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from evplace.core import families as plugs
+from evplace.core.errors import InputError, SettingsError
+from evplace.core.storage import locked, new_file, write_json
+from evplace.core.workers import run_all
+from evplace.evaluation import versions
+from evplace_lab.city import Progress as CityProgress
+from evplace_lab.city import generate
+from evplace_lab.reproduction._cases import Case
+from evplace_lab.reproduction._cities import Cities
+from evplace_lab.reproduction._real_sets import RealSets
+from evplace_lab.reproduction._runs import Runs
+
+Drives = Cities | RealSets
+Progress = Callable[[int, int, str], None]
+"""Called with (cases done, cases in all, what is being done)."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How much of a table is made."""
+
+    seeds: int = 3
+    """Trainings of each network, each from other first weights; 0 is the first seed."""
+    train: dict[str, Any] = field(default_factory=dict)
+    """Settings of all trainings over those of the recipes: for a quick look."""
+    inputs: tuple[str, ...] = ()
+    """Only these inputs; empty for all."""
+
+    def __post_init__(self) -> None:
+        if self.seeds < 1:
+            raise SettingsError(f"{self.seeds} seeds make no table: take at least 1")
+        for key in ("seed", "augment"):
+            if key in self.train:
+                raise SettingsError(f"'{key}' cannot be set for all trainings: the recipes need their own")
+
+
+class Table(NamedTuple):
+    """Something to print."""
+
+    title: str
+    columns: list[str]
+    rows: list[list[str]]
+
+
+def reproduce(
+    name: str,
+    out: str | Path,
+    city: str | Path | None = None,
+    data: str | Path | None = None,
+    choice: Choice | None = None,
+    workers: int | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Make a table or figure and write `out/NAME.json`; returns what it holds.
+
+    `city` is a folder of `evplace city`; without one, the benchmark is made in `out/city`. `data` is a folder
+    of real sets, which the table `real` is made of. `workers` processes are used (None: one a core); they do
+    not change the result. Raises SettingsError for an unknown name, InputError where a drive is lacking,
+    OutputError where another process writes `out`.
+    """
+    folder, chosen = Path(out), choice or Choice()
+    family = plugs.load("reproduction", name)
+    count = (os.cpu_count() or 1) if workers is None else workers
+    _check(name, family, chosen, count)
+    drives = _real_sets(data) if family.NEEDS == "data" else Cities(Path(city or folder / "city"), folder)
+    cases = family.cases(drives, chosen)
+    if city is not None or isinstance(drives, RealSets):
+        drives.check(cases)
+    began = time.monotonic()
+    with locked(folder / "reproduce"):
+        if city is None and isinstance(drives, Cities):
+            generate(drives.city, workers=count, progress=_of_city(progress))
+        runs = Runs(folder, drives.source)
+        cases = runs.distinct(cases)
+        _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, count, progress)
+        document: dict[str, Any] = family.collect(drives, runs, chosen)
+        document |= {
+            "settings": {"drives": drives.settings, "seeds": chosen.seeds, "train": chosen.train},
+            "versions": versions(),
+            "took_s": round(time.monotonic() - began, 1),
+            "cpu_s": round(runs.cpu_s(cases), 1),
+        }
+        with new_file(folder / f"{name}.json", overwrite=True) as partial:
+            write_json(partial, document)
+    return document
+
+
+def _check(name: str, family: ModuleType, choice: Choice, workers: int) -> None:
+    """SettingsError for a choice that this table cannot make."""
+    if workers < 1:
+        raise SettingsError(f"{workers} processes can do nothing: take at least 1")
+    for one in choice.inputs:
+        if one not in family.INPUTS:
+            known = ", ".join(family.INPUTS) or "none: it is made of all that it needs"
+            raise SettingsError(f"'{one}' is no input that {name} can be limited to: known are {known}")
+
+
+def _of_city(progress: Progress | None) -> Callable[[CityProgress], None] | None:
+    """The city's own progress, told as ours: in thousandths."""
+    if progress is None:
+        return None
+    return lambda at: progress(round(at.share * 1000), 1000, f"driving {at.drive}")
+
+
+def _real_sets(data: str | Path | None) -> RealSets:
+    """The sets in a folder of data; InputError where none is there."""
+    if data is None:
+        raise InputError("real sets are not made but read: give the folder that holds them with --data")
+    found = RealSets(Path(data))
+    if not found.present:
+        raise InputError(f"{data} holds none of the real sets that there are recipes for")
+    return found
+
+
+def _answer(
+    cases: list[Case], total: int, drives: Drives, runs: Runs, workers: int, progress: Progress | None
+) -> None:
+    """Run all `cases` in processes; those that share a map stand together."""
+    if not cases:
+        return
+    drives.prepare(cases, workers)
+    groups: dict[str, list[Case]] = {}
+    for case in cases:
+        groups.setdefault(runs.map_key(case), []).append(case)
+    # What is trained comes first: the longest work last would leave a core idle. Each process gets its share
+    # at once, for starting one takes seconds.
+    ordered = sorted(groups.values(), key=lambda group: group[0].train is None)
+    count = min(workers, len(ordered))
+    shares = [[sorted(group, key=_shared) for group in ordered[start::count]] for start in range(count)]
+    jobs = [
+        {
+            "kind": type(drives).__name__, "drives": drives.to_dict(), "out": str(runs.out),
+            "groups": [[case.to_dict() for case in group] for group in share],
+        }
+        for share in shares
+    ]  # fmt: skip
+    finished = [total - len(cases)]
+
+    def said(_: int, line: str) -> None:
+        finished[0] += 1
+        if progress is not None:
+            progress(finished[0], total, line)
+
+    run_all("evplace_lab.reproduction._worker", jobs, count, said)
+
+
+def _shared(case: Case) -> tuple[str, str, str]:
+    """Cases of one query and scorer stand together, so that rows are scored once."""
+    return case.query, case.scorer, str(case.scorer_settings)

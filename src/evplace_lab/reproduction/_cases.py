@@ -1,0 +1,146 @@
+"""Case: one cell of a table or one curve, as the plain values that decide what comes out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import evplace
+from evplace.core import settings
+from evplace.matchers import resolved_settings
+from evplace.scorers import checked_settings
+from evplace.scorers._network.training import PRESETS, TRAINED
+
+Values = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Input:
+    """What a method sees of a drive."""
+
+    sensor: str
+    """As tables name it: ideal, from-8bit, weak or camera."""
+    part: str
+    """The traverse of each drive that holds it."""
+    tone: str = "plain"
+    """What is done to camera images: see `evplace.imaging.tones`."""
+    exposure: str = "fixed"
+    """Of the camera: fixed, or auto."""
+    train: Values = field(default_factory=dict)
+    """Settings of the training over those of the paper."""
+    windows: Values | None = None
+    """Settings of windows, where the images are made anew from the drives' events."""
+    images: Values | None = None
+    """Settings of images, likewise."""
+    paper: str | None = None
+    """Column of the paper's tables beside it: events or colour."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """How places are found."""
+
+    scorer: str
+    """A scorer's name."""
+    matcher: str
+    """A matcher's name."""
+    preset: str | None = None
+    """A preset of the matcher."""
+    settings: Values = field(default_factory=dict)
+    """Settings of the matcher over those of the preset."""
+    scorer_settings: Values = field(default_factory=dict)
+    """Settings of the scorer."""
+    every: int = 1
+    """Use each, every second ... image of map and query."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One map, one query, one method, one seed; all settings resolved."""
+
+    database: str
+    """The drive that is learned: day-1."""
+    query: str
+    """The drive that is looked for: night-1."""
+    part: str
+    tone: str
+    exposure: str
+    windows: Values | None
+    images: Values | None
+    """See Input."""
+    scorer: str
+    scorer_settings: Values
+    matcher: str
+    matcher_settings: Values
+    every: int
+    """See Method; settings resolved."""
+    train: Values | None
+    """All settings of the training with its seed; None where nothing is trained."""
+    origin: tuple[float, float] = (0.0, 0.0)
+    """Corner of the grid of places, metres."""
+    swept: bool = False
+    """Whether the curve over the matcher's parameter is wanted, not its answers."""
+    keep: str = ""
+    """Name under which the whole result is kept; "" for none."""
+
+    @classmethod
+    def of(cls, database: str, query: str, seen: Input, method: Method, train: Values | None = None) -> Case:
+        """The first seed of a method on an input; `train` goes over the input's own settings of the training.
+
+        Raises SettingsError for an unknown name or setting.
+        """
+        matcher = resolved_settings(method.matcher, method.preset, **method.settings)
+        trained: Values | None = None
+        if method.scorer in TRAINED:
+            values = {**seen.train, **(train or {}), "seed": 0}
+            trained = settings.to_dict(settings.make(type(PRESETS["paper"]), values, PRESETS["paper"]))
+        return cls(
+            database=database,
+            query=query,
+            part=seen.part,
+            tone=seen.tone,
+            exposure=seen.exposure,
+            windows=seen.windows,
+            images=seen.images,
+            scorer=method.scorer,
+            scorer_settings=checked_settings(method.scorer, method.scorer_settings),
+            matcher=method.matcher,
+            matcher_settings=matcher,
+            every=method.every,
+            train=trained,
+        )
+
+    @classmethod
+    def from_dict(cls, values: Values) -> Case:
+        """The case that `to_dict` wrote."""
+        return cls(**{**values, "origin": tuple(values["origin"])})
+
+    def with_seeds(self, seeds: int) -> list[Case]:
+        """The same with each of the seeds 0, 1, ...; alone where nothing is trained."""
+        if self.train is None:
+            return [self]
+        return [replace(self, train={**self.train, "seed": seed}) for seed in range(seeds)]
+
+    def to_dict(self) -> Values:
+        """As plain values, for JSON."""
+        return asdict(self)
+
+    def key(self, source: Values) -> str:
+        """What two runs of the same case have in common: a checksum of its settings and of the drives'."""
+        return checksum({**replace(self, keep="").to_dict(), "city": source})
+
+    def map_key(self, source: Values) -> str:
+        """The same of its map alone: a network does not depend on the query, nor on who reads it."""
+        of_map = self.to_dict() | {"city": source}
+        beside = {"query", "matcher", "matcher_settings", "swept", "keep"}
+        if self.train is not None:
+            beside |= {"scorer", "scorer_settings"}
+        return checksum({name: value for name, value in of_map.items() if name not in beside})
+
+
+def checksum(values: Values) -> str:
+    """A name for these values and this version."""
+    text = json.dumps({**values, "evplace": evplace.__version__}, sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:20]

@@ -1,0 +1,66 @@
+"""Real sets: how often the best item is right, by each set's own truth.
+
+They have no positions; each image of the drive that is learned is a place. The network is trained as the
+paper says. An answer that a method does not stand by is wrong: there is nothing unseen in these drives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from evplace_lab.reproduction import Choice, Drives, Table
+from evplace_lab.reproduction._cases import Case, Input
+from evplace_lab.reproduction._figures import row_of, shown
+from evplace_lab.reproduction._real_sets import RealSet, RealSets
+from evplace_lab.reproduction._recipes import real_methods
+from evplace_lab.reproduction._runs import Runs
+
+TITLE = "Real drives: accuracy in %"
+NEEDS = "data"
+INPUTS: tuple[str, ...] = ()
+FORMAT = "evplace-table-1"
+
+
+def cases(drives: Drives, choice: Choice) -> list[Case]:
+    """All cells of the table, of the sets that are there."""
+    return [case for _, _, group in _cells(drives, choice) for case in group]
+
+
+def collect(drives: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
+    """The table as plain values: a row for each set, method and rule."""
+    rows = []
+    for real, method, group in _cells(drives, choice):
+        outcomes = [runs.found(case) for case in group]
+        about = {"database": real.reference, "query": real.title, "input": "images", "sensor": real.title}
+        for rule in real.rules:
+            rows.append({**about, "matcher": method, **row_of(outcomes, rule), "paper": None})
+    return {"format": FORMAT, "title": TITLE, "rows": rows}
+
+
+def tables(document: dict[str, Any]) -> Iterator[Table]:
+    """One table a set."""
+    rows = document["rows"]
+    for query in dict.fromkeys(row["query"] for row in rows):
+        of_set = [row for row in rows if row["query"] == query]
+        rules = list(dict.fromkeys(row["rule"] for row in of_set))
+        cells = {(row["matcher"], row["rule"]): row for row in of_set}
+        chance = [
+            "chance",
+            *(f"{next(r['chance'] for r in of_set if r['rule'] == rule):.1f}" for rule in rules),
+        ]
+        lines = [
+            [matcher, *(shown(cells[matcher, rule]) for rule in rules)]
+            for matcher in dict.fromkeys(row["matcher"] for row in of_set)
+        ]
+        yield Table(f"{query}: accuracy in %", ["method", *rules], [chance, *lines])
+
+
+def _cells(drives: Drives, choice: Choice) -> Iterator[tuple[RealSet, str, list[Case]]]:
+    assert isinstance(drives, RealSets)
+    seen = Input(sensor="real", part="images")
+    for real in drives.present:
+        database, query = (f"{real.title}: {drive}" for drive in (real.reference, real.query))
+        for method in real.methods:
+            case = Case.of(database, query, seen, real_methods()[method], choice.train)
+            yield real, method, case.with_seeds(choice.seeds)

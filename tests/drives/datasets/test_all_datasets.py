@@ -1,0 +1,59 @@
+"""What holds for every data set, and for folders that are none or several."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import made_sets
+from evplace.core import families as plugs
+from evplace.core.errors import DatasetError, RecordingError, SettingsError
+from evplace.drives.datasets import drives, matching, open_drive
+from evplace.drives.to_traverse import open_source, open_traverse
+from made_sets import write_gta, write_robotcar
+
+MAKERS: dict[str, Callable[[Path], object]] = {
+    name: getattr(made_sets, f"write_{name}") for name in plugs.names("datasets")
+}
+"""`made_sets` has a maker for each."""
+
+
+@pytest.mark.parametrize("name", sorted(MAKERS))
+def test_each_layout_is_recognised_by_its_own_set_alone(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "set"
+    folder.mkdir()
+    MAKERS[name](folder)
+    assert matching(folder) == [name]
+    first = drives(folder)[0]
+    assert open_drive(folder, first, name).source.size[0] > 0
+    assert open_source(folder, drive=first).track is not None or name == "lens"
+
+
+@pytest.mark.parametrize("name", sorted(MAKERS))
+def test_each_says_where_it_comes_from(name: str) -> None:
+    about = inspect.getdoc(plugs.load("datasets", name)) or ""
+    for word in ("itation", "icence", "ddress", "ayout"):
+        assert word in about
+    assert "\n" not in plugs.load("datasets", name).NEEDS
+
+
+def test_folders_that_are_no_set_or_several(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="there is no folder"):
+        open_drive(tmp_path / "none", "day")
+    with pytest.raises(DatasetError, match=r"layout of no known data set: known are brisbane, .*utm_folders"):
+        open_drive(tmp_path, "day")
+    with pytest.raises(RecordingError, match="the folder is of no known recording format"):
+        open_traverse(tmp_path)
+    with pytest.raises(SettingsError, match="'brisbayne' is none of the datasets: known are brisbane"):
+        open_drive(tmp_path, "day", "brisbayne")
+    with pytest.raises(DatasetError, match="holds no drive of robotcar, which needs: DATE/stereo"):
+        open_drive(tmp_path, "day", "robotcar")
+    write_gta(tmp_path)
+    write_robotcar(tmp_path)
+    with pytest.raises(DatasetError, match="may be gta or robotcar: say which with --dataset"):
+        open_drive(tmp_path, "day")
+    assert open_drive(tmp_path, "day", "gta").track is not None
+    assert drives(tmp_path, "robotcar") == ["2014-12-09-13-21-02"]

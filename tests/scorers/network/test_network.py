@@ -1,0 +1,171 @@
+"""Table 1, its training, and its twin in ONNX."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from evplace.core.errors import SettingsError, TraverseError
+from evplace.imaging.traverse import Traverse
+from evplace.placemap import PlaceMap
+from evplace.places import PlaceGrid
+from evplace.scorers import open_scorer
+from evplace.scorers._network import checkpoint
+from evplace.scorers._network.training import PRESETS, TrainSettings, batches, train, train_network
+
+torch = pytest.importorskip("torch", reason="the network needs the extra 'train'")
+
+from evplace.scorers._network.network import Network, NetworkSettings, to_input, weights_of  # noqa: E402 - only with torch
+from evplace.scorers._network.network_onnx import onnx_bytes  # noqa: E402
+from evplace.scorers.network import NetworkScorer  # noqa: E402
+
+Images = NDArray[np.uint8]
+
+
+def some_images(n: int = 5, shape: tuple[int, ...] = (90, 160)) -> Images:
+    return np.random.default_rng(3).integers(0, 256, (n, *shape), np.uint8)
+
+
+def test_table_1_has_the_papers_sizes() -> None:
+    network = Network(104, (1, 90, 160), NetworkSettings())
+    assert network.full1.in_features == 7040
+    assert network.full3.out_features == 104
+    assert sum(p.numel() for p in network.parameters()) == 1_528_908
+    assert network.norm1.eps == 1e-5
+    assert network.norm1.momentum == 0.1
+
+
+def test_an_odd_number_of_places_takes_the_whole_part_of_one_and_a_half() -> None:
+    assert Network(5, (1, 90, 160), NetworkSettings()).full2.out_features == 7
+
+
+def test_layers_in_the_order_of_the_table() -> None:
+    """MP(ReLU(conv)) then batch norm, with ReLU on the last layer as printed."""
+    network = Network(3, (1, 90, 160), NetworkSettings(last_relu=True)).eval()
+    x = to_input(some_images(2))
+    relu, pool = torch.relu, torch.nn.functional.max_pool2d
+    plain = network.norm1(pool(relu(network.conv1(x)), 2))
+    plain = network.norm2(pool(relu(network.conv2(plain)), 2))
+    plain = pool(relu(network.conv3(plain)), 2).flatten(1)
+    plain = relu(network.full3(relu(network.full2(relu(network.full1(plain))))))
+    torch.testing.assert_close(network(x), plain)
+    assert (network(x) >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("shape", "last_relu"), [((90, 160), True), ((90, 160), False), ((90, 160, 3), False)]
+)
+def test_the_onnx_graph_says_what_torch_says(shape: tuple[int, ...], last_relu: bool) -> None:
+    torch.manual_seed(1)
+    image = (3 if len(shape) == 3 else 1, 90, 160)
+    network = Network(7, image, NetworkSettings(last_relu=last_relu))
+    images = some_images(5, shape)
+    network(to_input(images))  # gives the batch norms statistics of their own
+    network.eval()
+    scores = NetworkScorer(onnx_bytes(weights_of(network), image, last_relu)).rows(images)
+    wanted = torch.softmax(network(to_input(images)), 1).detach().numpy()
+    np.testing.assert_allclose(scores, wanted, atol=1e-6)
+
+
+def test_training_learns_the_drive(network_map: PlaceMap, day: Traverse, places: PlaceGrid) -> None:
+    rows = open_scorer(network_map).rows(day.images)
+    labels = places.label(day.xy)
+    assert (rows.argmax(axis=1) == labels).mean() > 0.9
+    np.testing.assert_allclose(rows.sum(axis=1), 1, atol=1e-5)
+
+
+def test_a_seed_gives_the_same_weights(day: Traverse, places: PlaceGrid) -> None:
+    first, second, other = (train(day, places, steps=3, batch=8, seed=seed) for seed in (5, 5, 6))
+    assert first.network == second.network
+    assert first.network != other.network
+
+
+def test_a_killed_run_goes_on_to_the_same_weights(
+    day: Traverse, places: PlaceGrid, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(checkpoint, "EVERY", 2)
+    whole = train(day, places, steps=7, batch=8, dropout=0.2)
+    file = tmp_path / "run.checkpoint"
+
+    def kill(step: int, steps: int, loss: float) -> None:
+        if step == 5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(day, places, steps=7, batch=8, dropout=0.2, progress=kill, checkpoint=file)
+    steps_left: list[int] = []
+    resumed = train(
+        day,
+        places,
+        steps=7,
+        batch=8,
+        dropout=0.2,
+        checkpoint=file,
+        progress=lambda step, steps, loss: steps_left.append(step),
+    )
+    assert steps_left == [5, 6, 7]
+    assert resumed.network == whole.network
+    assert not file.exists()
+
+
+def test_a_checkpoint_of_another_run_is_passed_over(day: Traverse, places: PlaceGrid, tmp_path: Path) -> None:
+    file = tmp_path / "run.checkpoint"
+    file.write_bytes(b"cut")
+    assert (
+        train(day, places, steps=2, batch=8, checkpoint=file).network
+        == train(day, places, steps=2, batch=8).network
+    )
+
+
+def test_batches_are_shuffled_passes() -> None:
+    found = list(batches(10, 4, seed=0, first=0, steps=6))
+    assert [len(batch) for batch in found] == [4, 4, 2, 4, 4, 2]
+    assert sorted(np.concatenate(found[:3])) == list(range(10))
+    later = list(batches(10, 4, seed=0, first=4, steps=6))
+    assert [batch.tolist() for batch in later] == [batch.tolist() for batch in found[4:]]
+
+
+def test_sgd_and_epochs(day: Traverse, places: PlaceGrid) -> None:
+    seen: list[int] = []
+    settings = TrainSettings(optimiser="sgd", epochs=2, batch=32)
+    train(day, places, settings=settings, progress=lambda step, steps, loss: seen.append(steps))
+    assert seen == [2 * -(-len(day) // 32)] * seen[0]
+
+
+def test_presets_say_what_the_paper_and_its_notebook_say() -> None:
+    paper = PRESETS["paper"]
+    assert (paper.last_relu, paper.learning_rate, paper.batch, paper.steps) == (True, 0.001, 64, 1000)
+    assert (PRESETS["notebook"].dropout, PRESETS["notebook"].epochs) == (0.5, 1000)
+
+
+def test_one_image_at_a_time_says_what_a_batch_says(network_map: PlaceMap, day: Traverse) -> None:
+    scorer = open_scorer(network_map)
+    single = np.concatenate([scorer.rows(image[None]) for image in day.images])
+    np.testing.assert_allclose(single, scorer.rows(day.images), atol=1e-6)
+
+
+@pytest.mark.parametrize("wrong", [{"batch": 0}, {"steps": -1}, {"seed": -1}, {"learning_rate": 0.0}])
+def test_settings_that_cannot_be_are_refused(wrong: dict[str, object]) -> None:
+    with pytest.raises(SettingsError):
+        TrainSettings(**wrong)  # type: ignore[arg-type]
+
+
+def test_no_image_with_a_place_is_an_error(day: Traverse, places: PlaceGrid) -> None:
+    lost = Traverse(day.images, day.t_us, day.counts, None, day.info)
+    with pytest.raises(TraverseError, match="no image of the traverse has a place"):
+        train(lost, places, steps=1)
+
+
+def test_small_images_are_refused() -> None:
+    with pytest.raises(SettingsError, match="at least 8x8"):
+        train_network(some_images(2, (7, 7)), np.zeros(2, np.int64), np.ones(2, np.bool_), 1, TrainSettings())
+
+
+def test_one_place_only_is_learned(day: Traverse) -> None:
+    assert day.track is not None
+    one = PlaceGrid.from_track(day.track, cell_m=1e6)
+    learned = train(day, one, steps=1, batch=4)
+    assert open_scorer(learned).rows(day.images[:2]).tolist() == [[1.0], [1.0]]

@@ -1,0 +1,234 @@
+"""Small recordings of every format, made by code or by a second library."""
+
+from __future__ import annotations
+
+import sqlite3
+import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from evplace.core.events import Events
+
+SIZE = (240, 180)
+
+
+def some_events(count: int = 3000, span_us: int = 100_000, seed: int = 0) -> Events:
+    """Random events of a 240x180 sensor, in order."""
+    rng = np.random.default_rng(seed)
+    t_us = np.sort(rng.integers(0, span_us, count))
+    return Events.of(
+        t_us, rng.integers(0, 240, count), rng.integers(0, 180, count), rng.random(count) < 0.5, SIZE
+    )
+
+
+def _by_faery(name: str, **options: Any) -> Callable[[Path, Events], Path]:
+    def write(folder: Path, events: Events) -> Path:
+        faery = pytest.importorskip("faery")
+        array = np.zeros(len(events), faery.events_stream.EVENTS_DTYPE)
+        array["t"], array["x"], array["y"], array["p"] = events.t_us, events.x, events.y, events.p
+        packets = [array[start : start + 100] for start in range(0, len(array), 100)]
+        faery.file_encoder.events_to_file(packets, folder / name, events.size, zero_t0=False, **options)
+        return folder / name
+
+    return write
+
+
+def aedat2(folder: Path, events: Events) -> Path:
+    address = (
+        (179 - events.y.astype(np.uint32)) << 22
+        | (239 - events.x.astype(np.uint32)) << 12
+        | events.p.astype(np.uint32) << 11
+    )
+    words = np.stack([address, events.t_us.astype(np.uint32)], 1).astype(">u4").tobytes()
+    path = folder / "made.aedat"
+    path.write_bytes(b"#!AER-DAT2.0\r\n# AEChip: eu.seebetter.ini.chips.davis.DAVIS240C\r\n" + words)
+    return path
+
+
+def evt21(folder: Path, events: Events) -> Path:
+    """One word an event, and one with the high bits of the time before each."""
+    t, x, y, p = (field.astype(np.uint64) for field in (events.t_us, events.x, events.y, events.p))
+    high = np.uint64(8) << np.uint64(60) | t >> np.uint64(6) << np.uint64(32)
+    event = p << np.uint64(60) | (t & np.uint64(63)) << np.uint64(54) | (x & ~np.uint64(31)) << np.uint64(43)
+    event |= y << np.uint64(32) | np.uint64(1) << (x & np.uint64(31))
+    path = folder / "made.raw"
+    words = np.stack([high, event], 1).astype("<u8").tobytes()
+    path.write_bytes(b"% evt 2.1\n% geometry 240x180\n% end\n" + words)
+    return path
+
+
+def npz(folder: Path, events: Events) -> Path:
+    path = folder / "made.npz"
+    names = {"t_us": events.t_us, "x": events.x, "y": events.y, "p": events.p}
+    np.savez_compressed(path, **names, width=events.size[0], height=events.size[1])
+    return path
+
+
+def hdf5(folder: Path, events: Events) -> Path:
+    """The layout of DSEC, in chunks."""
+    h5py: Any = pytest.importorskip("h5py")
+    path = folder / "made.h5"
+    with h5py.File(path, "w") as file:
+        file["t_offset"] = 0
+        file["ms_to_idx"] = np.searchsorted(events.t_us, np.arange(0, 100_000, 1000))
+        group = file.create_group("events")
+        group.attrs["width"], group.attrs["height"] = events.size
+        for name, rows in (
+            ("t", events.t_us),
+            ("x", events.x),
+            ("y", events.y),
+            ("p", events.p.astype("u1")),
+        ):
+            group.create_dataset(name, data=rows, chunks=(min(1024, len(rows)),), compression="gzip")
+    return path
+
+
+def aedat3(folder: Path, events: Events) -> Path:
+    """Packets of 100 events, and one of another kind between any two."""
+    data = b"#!AER-DAT3.1\r\n#Format: RAW\r\n#Source 1: DAVIS240C\r\n#!END-HEADER\r\n"
+    pixel = events.x.astype("<u4") << 17 | events.y.astype("<u4") << 2 | events.p.astype("<u4") << 1 | 1
+    words = np.stack([pixel, (events.t_us & 0x7FFFFFFF).astype("<u4")], 1)
+    for start in range(0, len(events), 100):
+        part, wraps = words[start : start + 100], int(events.t_us[start] >> 31)
+        data += struct.pack("<hhiiiiii", 1, 1, 8, 4, wraps, len(part), len(part), len(part)) + part.tobytes()
+        data += struct.pack("<hhiiiiii", 3, 1, 36, 4, wraps, 1, 1, 1) + bytes(36)
+    path = folder / "made3.aedat"
+    path.write_bytes(data)
+    return path
+
+
+def ros2_mcap(folder: Path, events: Events) -> Path:
+    writer: Any = pytest.importorskip("mcap.writer")
+    path = folder / "made.mcap"
+    with path.open("wb") as file:
+        out = writer.Writer(file, chunk_size=4000, compression=writer.CompressionType.ZSTD)
+        out.start("ros2", "test")
+        kind = "event_camera_msgs/msg/EventPacket"
+        channel = out.register_channel("/events", "cdr", out.register_schema(kind, "ros2msg", b""))
+        for message in packet_messages(events, aligned=True):
+            out.add_message(channel, log_time=0, publish_time=0, data=message)
+        out.finish()
+    return path
+
+
+def parquet(folder: Path, events: Events) -> Path:
+    pyarrow: Any = pytest.importorskip("pyarrow")
+    files: Any = pytest.importorskip("pyarrow.parquet")
+    columns = {"t_ns": events.t_us * 1000, "x": events.x, "y": events.y, "p": events.p.astype("u1")}
+    files.write_table(pyarrow.table(columns), folder / "made.parquet", row_group_size=500)
+    return folder / "made.parquet"
+
+
+def text(folder: Path, events: Events) -> Path:
+    """Seconds, as rpg's data sets write them."""
+    rows = zip(events.t_us.tolist(), events.x.tolist(), events.y.tolist(), events.p.tolist(), strict=True)
+    path = folder / "made.txt"
+    path.write_text("240 180\n" + "".join(f"{t / 1e6:.6f} {x} {y} {p:d}\n" for t, x, y, p in rows))
+    return path
+
+
+def evt3_words(events: Events) -> np.ndarray:
+    """Events one by one, each with its row and time."""
+    words = np.empty((len(events), 4), np.uint16)
+    words[:, 0] = 0x8000 | (events.t_us >> 12 & 0xFFF)
+    words[:, 1] = 0x6000 | (events.t_us & 0xFFF)
+    words[:, 2] = events.y
+    words[:, 3] = 0x2000 | events.p.astype(np.uint16) << 11 | events.x
+    return words.reshape(-1)
+
+
+def packet_messages(events: Events, aligned: bool, each: int = 200) -> list[bytes]:
+    """The events as serialised event_camera_msgs/EventPacket."""
+    messages = []
+    for start in range(0, len(events), each):
+        words = evt3_words(events[start : start + each]).tobytes()
+        stamp = struct.pack("<II", 0, 0)
+        if aligned:
+            head = stamp + struct.pack("<I4sII", 4, b"cam\0", events.size[1], events.size[0])
+            head += b"\0" * (-len(head) % 8) + struct.pack("<QQI5sB", start, 0, 5, b"evt3\0", 0)
+            head = b"\0\1\0\0" + head + b"\0" * (-len(head) % 4)
+        else:
+            head = (
+                struct.pack("<I", start)
+                + stamp
+                + struct.pack("<I3sII", 3, b"cam", events.size[1], events.size[0])
+            )
+            head += struct.pack("<QQI4sB", start, 0, 4, b"evt3", 0)
+        messages.append(head + struct.pack("<I", len(words)) + words)
+    return messages
+
+
+def ros1(folder: Path, events: Events) -> Path:
+    return ros1_bag(folder, "event_camera_msgs/EventPacket", packet_messages(events, aligned=False))
+
+
+def ros1_bag(folder: Path, kind: str, messages: list[bytes]) -> Path:
+    def record(fields: dict[str, bytes], data: bytes) -> bytes:
+        head = b"".join(
+            struct.pack("<I", len(n) + 1 + len(v)) + n.encode() + b"=" + v for n, v in fields.items()
+        )
+        return struct.pack("<I", len(head)) + head + struct.pack("<I", len(data)) + data
+
+    connection = b"".join(
+        struct.pack("<I", len(text)) + text
+        for text in (b"topic=/events", b"type=" + kind.encode(), b"md5sum=*")
+    )
+    chunks = [record({"op": b"\7", "conn": b"\0\0\0\0", "topic": b"/events"}, connection)]
+    chunks += [record({"op": b"\2", "conn": b"\0\0\0\0", "time": b"\0" * 8}, message) for message in messages]
+    body = b""
+    for chunk in chunks:
+        size = struct.pack("<I", len(chunk))
+        body += record({"op": b"\5", "compression": b"none", "size": size}, chunk)
+    start = b"#ROSBAG V2.0\n"
+    index = struct.pack("<Q", len(start) + 4096 + len(body))
+    top = record({"op": b"\3", "index_pos": index, "conn_count": b"\1\0\0\0"}, b"")
+    top = record({"op": b"\3", "index_pos": index, "conn_count": b"\1\0\0\0"}, b" " * (4096 - len(top)))
+    path = folder / "made.bag"
+    path.write_bytes(
+        start + top + body + record({"op": b"\7", "conn": b"\0\0\0\0", "topic": b"/e"}, connection)
+    )
+    return path
+
+
+def ros2_db3(folder: Path, events: Events) -> Path:
+    return ros2_bag(folder, "event_camera_msgs/msg/EventPacket", packet_messages(events, aligned=True))
+
+
+def ros2_bag(folder: Path, kind: str, messages: list[bytes]) -> Path:
+    path = folder / "made_0.db3"
+    base = sqlite3.connect(path)
+    base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL)")
+    base.execute(
+        "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)"
+    )
+    base.execute("INSERT INTO topics VALUES (1, '/events', ?)", (kind,))
+    base.executemany(
+        "INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 0, ?)", [(m,) for m in messages]
+    )
+    base.commit()
+    base.close()
+    return path
+
+
+MAKERS: dict[str, Callable[[Path, Events], Path]] = {
+    "aedat2": aedat2,
+    "aedat3": aedat3,
+    "aedat4": _by_faery("made.aedat4"),
+    "dat": _by_faery("made.dat", version="dat2"),
+    "es": _by_faery("made.es"),
+    "evt2": _by_faery("made.raw", version="evt2"),
+    "evt21": evt21,
+    "evt3": _by_faery("made.raw", version="evt3"),
+    "hdf5": hdf5,
+    "npz": npz,
+    "parquet": parquet,
+    "ros1": ros1,
+    "ros2_db3": ros2_db3,
+    "ros2_mcap": ros2_mcap,
+    "text": text,
+}
+"""By the name of the format: writes events into a folder and returns the file."""

@@ -1,0 +1,138 @@
+"""Messages with events, as a second library writes them, in both kinds of bags."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from made import ros1_bag, ros2_bag, some_events
+
+from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.events import Events
+from evplace.sources.readers import open_recording
+
+DEFINITION = """std_msgs/Header header
+uint32 height
+uint32 width
+dvs_msgs/Event[] events
+================================================================================
+MSG: dvs_msgs/Event
+uint16 x
+uint16 y
+{time} ts
+bool polarity
+"""
+
+
+def read(path: Path) -> Events:
+    return Events.concatenate(list(open_recording(path).packets()))
+
+
+def serialised(events: Events, frame_id: str, ros1: bool) -> list[bytes]:
+    """The events as dvs_msgs/EventArray, ten a message."""
+    typesys: Any = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS1_NOETIC if ros1 else typesys.Stores.ROS2_HUMBLE)
+    text = DEFINITION.format(time="time" if ros1 else "builtin_interfaces/Time")
+    store.register(typesys.get_types_from_msg(text, "dvs_msgs/msg/EventArray"))
+    one, many = store.types["dvs_msgs/msg/Event"], store.types["dvs_msgs/msg/EventArray"]
+    stamp, header = store.types["builtin_interfaces/msg/Time"], store.types["std_msgs/msg/Header"]
+    zero = stamp(sec=0, nanosec=0)
+    top = header(seq=0, stamp=zero, frame_id=frame_id) if ros1 else header(stamp=zero, frame_id=frame_id)
+    rows = [
+        one(
+            x=int(x), y=int(y), ts=stamp(sec=int(t // 10**6), nanosec=int(t % 10**6 * 1000)), polarity=bool(p)
+        )
+        for t, x, y, p in zip(events.t_us, events.x, events.y, events.p, strict=True)
+    ]
+    write = store.serialize_ros1 if ros1 else store.serialize_cdr
+    messages = [
+        many(header=top, height=180, width=240, events=rows[start : start + 10])
+        for start in range(0, len(rows), 10)
+    ]
+    return [bytes(write(message, "dvs_msgs/msg/EventArray")) for message in messages]
+
+
+@pytest.mark.parametrize("frame_id", ["", "a", "ab", "abc", "abcd"])
+@pytest.mark.parametrize("ros1", [True, False])
+def test_event_arrays(ros1: bool, frame_id: str, tmp_path: Path) -> None:
+    events = some_events(95, 3_000_000)
+    messages = serialised(events, frame_id, ros1)
+    path = (
+        ros1_bag(tmp_path, "dvs_msgs/EventArray", messages)
+        if ros1
+        else ros2_bag(tmp_path, "dvs_msgs/msg/EventArray", messages)
+    )
+    recording = open_recording(path)
+    back = Events.concatenate(list(recording.packets()))
+    assert (recording.size, recording.notes) == ((240, 180), [])
+    for field in ("t_us", "x", "y", "p"):
+        assert np.array_equal(getattr(back, field), getattr(events, field))
+
+
+def test_a_bag_without_events_says_what_it_holds(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no event messages.*sensor_msgs/Image"):
+        open_recording(ros1_bag(tmp_path, "sensor_msgs/Image", [b"\0" * 20]))
+
+
+def test_the_bags_of_the_second_library(tmp_path: Path) -> None:
+    """Chunks packed with lz4 and bz2, and single messages packed with zstd."""
+    rosbag1: Any = pytest.importorskip("rosbags.rosbag1")
+    rosbag2: Any = pytest.importorskip("rosbags.rosbag2")
+    events = some_events(100, 1_000_000)
+    for form in rosbag1.Writer.CompressionFormat:
+        writer = rosbag1.Writer(tmp_path / f"{form.name}.bag")
+        writer.set_compression(form)
+        with writer:
+            line = writer.add_connection("/e", "dvs_msgs/msg/EventArray", msgdef=DEFINITION, md5sum="0" * 32)
+            for message in serialised(events, "cam", ros1=True):
+                writer.write(line, 0, message)
+        assert sum(map(len, open_recording(tmp_path / f"{form.name}.bag").packets())) == 100
+    writer = rosbag2.Writer(tmp_path / "packed", version=8)
+    writer.set_compression(rosbag2.CompressionMode.MESSAGE, rosbag2.CompressionFormat.ZSTD)
+    with writer:
+        line = writer.add_connection("/e", "dvs_msgs/msg/EventArray", msgdef=DEFINITION, rihs01="0")
+        for message in serialised(events, "cam", ros1=False):
+            writer.write(line, 0, message)
+    assert sum(map(len, open_recording(tmp_path / "packed").packets())) == 100
+
+
+def packet(encoding: str, base_ns: int, payload: bytes) -> bytes:
+    """A serialised event_camera_msgs/EventPacket of ROS 1, stamped 7 s."""
+    head = struct.pack("<IIII3sIIQQ", 0, 7, 0, 3, b"cam", 180, 240, 0, base_ns)
+    name = encoding.encode()
+    return head + struct.pack("<I", len(name)) + name + b"\0" + struct.pack("<I", len(payload)) + payload
+
+
+def test_the_encoding_mono(tmp_path: Path) -> None:
+    events = some_events(500, 900_000)
+    dt_ns = events.t_us.astype("<u8") * np.uint64(1000)
+    x, y, p = (field.astype("<u8") for field in (events.x, events.y, events.p))
+    words = p << np.uint64(63) | y << np.uint64(48) | x << np.uint64(32) | dt_ns
+    messages = [packet("mono", 10**9, words[:250].tobytes()), packet("mono", 10**9, words[250:].tobytes())]
+    back = read(ros1_bag(tmp_path, "event_camera_msgs/EventPacket", messages))
+    assert np.array_equal(back.t_us - 7_000_000, events.t_us - events.t_us[0])
+    assert np.array_equal(back.x, events.x)
+    assert np.array_equal(back.y, events.y)
+    assert np.array_equal(back.p, events.p)
+
+
+def test_the_encoding_libcaer_with_a_wrap_inside_a_packet(tmp_path: Path) -> None:
+    events = some_events(500, 900_000)
+    true_us = events.t_us + (1 << 31) - 400_000
+    pixel = events.x.astype("<u4") << 17 | events.y.astype("<u4") << 2 | events.p.astype("<u4") << 1 | 1
+    words = np.stack([pixel, (true_us & 0x7FFFFFFF).astype("<u4")], 1).tobytes()
+    back = read(
+        ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [packet("libcaer", 5_000_000_000, words)])
+    )
+    assert np.array_equal(back.t_us, true_us + 5_000_000)
+    assert np.array_equal(back.x, events.x)
+    assert np.array_equal(back.p, events.p)
+
+
+def test_an_unknown_encoding_is_an_error_that_names_the_known(tmp_path: Path) -> None:
+    path = ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [packet("evt9", 0, b"\0" * 8)])
+    with pytest.raises(DamagedRecordingError, match=r"evt9.*known are evt3, mono, libcaer"):
+        read(path)
