@@ -11,14 +11,11 @@ import pytest
 from hypothesis import settings
 
 from evplace.core.events import Events
-from evplace.core.settings import to_dict
-from evplace.imaging.images import ImageSettings
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.stream import event_images
 from evplace.imaging.traverse import Traverse
-from evplace.imaging.windows import WindowSettings
-from evplace.placemap import PlaceMap
+from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
-from evplace.scorers._network.training import train
 from evplace.sources.tracks import Track
 from evplace.sources.writers import write_recording
 
@@ -87,13 +84,7 @@ def make_traverse(drive: Drive) -> Traverse:
     images = np.stack([image for image, _ in found])
     t_us = np.array([window.t_us for _, window in found], np.int64)
     counts = np.array([window.events for _, window in found], np.int64)
-    info = {
-        "input": "events",
-        "sensor": list(drive.events.size),
-        "windows": to_dict(WindowSettings()),
-        "images": to_dict(ImageSettings()),
-    }
-    return Traverse(images, t_us, counts, drive.track.at(t_us), info)
+    return Traverse(images, t_us, counts, drive.track.at(t_us), Recipe("events", drive.events.size))
 
 
 @pytest.fixture(scope="session")

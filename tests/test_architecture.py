@@ -12,12 +12,16 @@ import pytest
 SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
-    "evplace": "core sources imaging drives places placemap scorers matchers localizer evaluation doctor cli",
-    "evplace.core": "errors events families settings storage workers",
+    "evplace": (
+        "core sources imaging drives places scorers placemap matchers localizer evaluation doctor cli"
+    ),
+    "evplace.core": "errors events settings families storage workers",
     "evplace.sources": "frames readers writers cleaning tracks film simulators",
-    "evplace.imaging": "windows resampling representations tones images stream spacing traverse sheets",
+    "evplace.imaging": (
+        "windows resampling representations tones images recipe stream spacing traverse sheets"
+    ),
     "evplace.drives": "datasets to_traverse",
-    "evplace.scorers": "_distances _seqslam_images _network",
+    "evplace.scorers": "_search _distances _seqslam_images _network",
     "evplace.scorers._network": "network network_onnx augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
     "evplace_lab": "city reproduction report cli",

@@ -11,9 +11,9 @@ import evplace
 
 PUBLIC = [
     "CleaningSettings", "Events", "EvplaceError", "ImageSettings", "Localizer", "Match", "PlaceGrid",
-    "PlaceMap", "PlaceRuns", "Recording", "Result", "SpacingSettings", "Track", "TrainSettings",
+    "PlaceMap", "PlaceRuns", "Recipe", "Recording", "Result", "SpacingSettings", "Track", "TrainSettings",
     "Traverse", "WindowSettings", "__version__", "compare", "evaluate", "event_image", "open_recording",
-    "open_track", "open_traverse", "train",
+    "matchers", "open_track", "open_traverse", "scorers", "train",
 ]  # fmt: skip
 
 
@@ -30,7 +30,7 @@ def test_each_is_what_its_name_says_whatever_was_imported_before() -> None:
         "print([n for n in evplace.__all__ if type(getattr(evplace, n)).__name__ == 'module'])"
     )
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert answer.stdout.strip() == "[]"
+    assert answer.stdout.strip() == "['matchers', 'scorers']"
 
 
 def test_type_checkers_see_the_same_names() -> None:
@@ -42,4 +42,4 @@ def test_type_checkers_see_the_same_names() -> None:
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
-    assert seen == evplace._PUBLIC
+    assert seen == evplace._PUBLIC | dict.fromkeys(evplace._PACKAGES, "evplace")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -10,13 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from conftest import Drive, make_drive, make_traverse
+from evplace.core import families
 from evplace.core.errors import PlaceMapError, RecordingError, SettingsError
 from evplace.core.events import Events
+from evplace.evaluation._evaluate import evaluate
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer, Match
-from evplace.placemap import PlaceMap
+from evplace.matchers.local import Local
+from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
-from evplace.scorers._network.training import train
 
 
 def pushed(where: Localizer, packets: list[Events]) -> list[Match]:
@@ -25,34 +29,78 @@ def pushed(where: Localizer, packets: list[Events]) -> list[Match]:
     return found + list(where.finish())
 
 
-@pytest.mark.parametrize("kind", ["image_map", "network_map"])
-@pytest.mark.parametrize("matcher", ["best", "local"])
-def test_events_are_answered_as_their_traverse_is(
-    kind: str, matcher: str, request: pytest.FixtureRequest, night_drive: Drive, night: Traverse
+def in_pieces(events: Events, cuts: list[int]) -> list[Events]:
+    edges = [0, *sorted(min(cut, len(events)) for cut in cuts), len(events)]
+    return [events[a:b] for a, b in itertools.pairwise(edges)]
+
+
+MATCHERS = {
+    "best": {}, "local": {"tau1": 0.5}, "seqslam": {"ds": 7, "mu": 1.0}, "graph": {}, "dp": {}, "hmm": {},
+}  # fmt: skip
+
+
+def test_every_matcher_is_tried_here() -> None:
+    assert sorted(MATCHERS) == families.names("matchers")
+
+
+@pytest.mark.parametrize("matcher", MATCHERS)
+@settings(max_examples=6)
+@given(cuts=st.lists(st.integers(0, 40_000), max_size=12))
+def test_packets_of_any_size_and_their_traverse_are_answered_alike(
+    matcher: str, image_map: PlaceMap, night_drive: Drive, night: Traverse, cuts: list[int]
 ) -> None:
-    where = Localizer(request.getfixturevalue(kind), matcher)
+    """Pushed in any pieces, as a traverse, or evaluated: the same answers, to the last bit."""
+    where = Localizer(image_map, matcher, **MATCHERS[matcher])
+    live = pushed(where, in_pieces(night_drive.events, cuts))
+    where.reset()
+    assert list(where.match_traverse(night)) == live
+    measured = evaluate(where, night).answers
+    answered = {match.t_us: match for match in live}
+    for at, t_us in enumerate(night.t_us.tolist()):
+        match = answered.get(t_us)
+        if match is None:
+            assert measured.item[at] == -1
+            assert not measured.accepted[at]
+            continue
+        assert measured.item[at] == match.item
+        assert measured.accepted[at] == (match.state == "localised")
+        np.testing.assert_equal(measured.score[at], match.score)
+
+
+def test_a_network_is_pushed_and_evaluated_alike(
+    network_map: PlaceMap, night_drive: Drive, night: Traverse
+) -> None:
+    where = Localizer(network_map, "local")
     live = pushed(where, [night_drive.events])
-    path, _ = where.path(night)
+    path = where.answers(night).path
     assert [match.t_us for match in live] == night.t_us.tolist()
     assert [match.item for match in live] == path.item.tolist()
-    assert [match.state == "localised" for match in live] == path.accepted.tolist()
-    np.testing.assert_allclose([match.score for match in live], path.score, atol=1e-5)
+    assert [match.score for match in live] == path.score.tolist()
 
 
-@settings(max_examples=10)
-@given(cuts=st.lists(st.integers(0, 40_000), max_size=12))
-def test_the_size_of_packets_changes_nothing(
-    image_map: PlaceMap, night_drive: Drive, cuts: list[int]
-) -> None:
-    where = Localizer(image_map, "best")
-    events = night_drive.events
-    edges = [0, *sorted(min(cut, len(events)) for cut in cuts), len(events)]
-    parts = [events[a:b] for a, b in itertools.pairwise(edges)]
-    assert pushed(where, parts) == pushed(where, [events])
+def test_the_same_localizer_answers_live_and_in_hindsight(image_map: PlaceMap, night: Traverse) -> None:
+    where = Localizer(image_map, "seqslam", ds=7, mu=0.0)
+    live, hindsight = where.answers(night), where.answers(night, "hindsight")
+    assert live.delay == 3
+    assert hindsight.delay == len(night) - 1
+    np.testing.assert_array_equal(live.path.item, hindsight.path.item)
+    assert (live.path.item[-3:] == -1).all()
+    again = where.answers(night, rows=live.rows)
+    np.testing.assert_array_equal(again.path.score, live.path.score)
+
+
+def test_a_matcher_by_name_and_as_an_object_are_the_same(image_map: PlaceMap, night: Traverse) -> None:
+    named = Localizer(image_map, "local", K=2, tau1=0.6)
+    given_one = Localizer(image_map, Local(K=2, tau1=0.6))
+    assert named.settings == given_one.settings
+    for ours, theirs in zip(named.answers(night).path, given_one.answers(night).path, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    with pytest.raises(SettingsError, match="put them into the object"):
+        Localizer(image_map, Local(), K=2)
 
 
 def test_it_finds_the_way(image_map: PlaceMap, night: Traverse, places: PlaceGrid) -> None:
-    path, rows = Localizer(image_map, "best").path(night)
+    path, rows, _ = Localizer(image_map, "best").answers(night)
     assert rows.shape == (len(night), len(image_map.items))
     assert places.accepts(image_map.items.place[path.item], night.xy).mean() > 0.95
 
@@ -74,7 +122,7 @@ def test_empty_windows_are_told_and_skipped(image_map: PlaceMap, night_drive: Dr
     assert len(found) == 60
     assert [match.t_us for match in found] == sorted(match.t_us for match in found)
     traverse = make_traverse(Drive(gap, night_drive.track))
-    path, rows = Localizer(image_map, "best").path(traverse)
+    path, rows, _ = Localizer(image_map, "best").answers(traverse)
     assert [m.item for m in found] == path.item.tolist()
     assert not rows[traverse.counts == 0].any()
 
@@ -92,9 +140,9 @@ def test_another_sensor_or_another_kind_of_image_is_refused(
 ) -> None:
     with pytest.raises(RecordingError, match="80x60 pixels, this recording has 320x240"):
         list(Localizer(image_map).push(Events.of([0], [0], [0], [True], (320, 240))))
-    with pytest.raises(PlaceMapError, match="same image settings"):
-        Localizer(image_map).path(Traverse(day.images[:, :50], day.t_us, day.counts))
-    frames = Traverse(day.images, day.t_us, day.counts, day.track, {"input": "frames"})
+    with pytest.raises(PlaceMapError, match="with the map's recipe"):
+        Localizer(image_map).answers(Traverse(day.images[:, :50], day.t_us, day.counts))
+    frames = dataclasses.replace(day, recipe=Recipe("frames", (80, 60)))
     with pytest.raises(PlaceMapError, match="cannot localise events"):
         list(Localizer(train(frames, places, scorer="sad")).push(make_drive().events))
 

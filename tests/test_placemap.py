@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from evplace import scorers
 from evplace.core.errors import OutputError, PlaceMapError, SettingsError
 from evplace.imaging.traverse import Traverse
-from evplace.placemap import PlaceMap
+from evplace.localizer import Localizer
+from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid, PlaceRuns
-from evplace.scorers import checked_settings, open_scorer
-from evplace.scorers._network.training import train
 
 
 @pytest.mark.parametrize("kind", ["image_map", "network_map"])
@@ -26,12 +25,12 @@ def test_a_saved_map_answers_as_before(
     assert loaded.settings == learned.settings
     assert loaded.places.to_dict() == learned.places.to_dict()
     np.testing.assert_array_equal(loaded.items.position, learned.items.position)
-    wanted = open_scorer(learned).rows(night.images)
-    np.testing.assert_array_equal(open_scorer(loaded).rows(night.images), wanted)
+    wanted = Localizer(learned).rows(night.images)
+    np.testing.assert_array_equal(Localizer(loaded).rows(night.images), wanted)
 
 
 def test_a_map_without_positions(day: Traverse, tmp_path: Path) -> None:
-    lost = Traverse(day.images, day.t_us, day.counts, None, day.info)
+    lost = Traverse(day.images, day.t_us, day.counts, None, day.recipe)
     train(lost, PlaceRuns(len(day), every=10), scorer="sad").save(tmp_path / "map")
     loaded = PlaceMap.load(tmp_path / "map")
     assert loaded.items.place.tolist() == [n // 10 for n in range(len(day))]
@@ -67,12 +66,10 @@ def test_an_existing_map_is_not_overwritten_unasked(image_map: PlaceMap, tmp_pat
 
 
 def test_scorers_and_their_settings_are_checked(day: Traverse, places: PlaceGrid) -> None:
-    assert checked_settings("ncc", {"sigma": 1})["sigma"] == 1.0
+    assert train(day, places, "ncc", sigma=1).scorer == scorers.NCC(sigma=1.0)
     with pytest.raises(SettingsError, match="did you mean 'sigma'"):
-        checked_settings("ncc", {"sigmas": 1})
+        train(day, places, "ncc", sigmas=1)
     with pytest.raises(SettingsError, match="known are cosine, ncc, network"):
-        checked_settings("nearest", {})
-    known = train(day, places, scorer="sad")
-    unknown = dataclasses.replace(known, scorer="nearest")
-    with pytest.raises(PlaceMapError, match="nearest"):
-        open_scorer(unknown)
+        train(day, places, "nearest")
+    with pytest.raises(SettingsError, match="put them into the object"):
+        train(day, places, scorers.NCC(), sigma=1)

@@ -6,6 +6,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and type checkers; a test holds this list against the one below
+    from evplace import matchers as matchers
+    from evplace import scorers as scorers
     from evplace.core.errors import EvplaceError as EvplaceError
     from evplace.core.events import Events as Events
     from evplace.drives.to_traverse import open_traverse as open_traverse
@@ -14,16 +16,17 @@ if TYPE_CHECKING:  # for editors and type checkers; a test holds this list again
     from evplace.evaluation._evaluate import evaluate as evaluate
     from evplace.imaging.images import ImageSettings as ImageSettings
     from evplace.imaging.images import event_image as event_image
+    from evplace.imaging.recipe import Recipe as Recipe
     from evplace.imaging.spacing import SpacingSettings as SpacingSettings
     from evplace.imaging.traverse import Traverse as Traverse
     from evplace.imaging.windows import WindowSettings as WindowSettings
     from evplace.localizer import Localizer as Localizer
     from evplace.localizer import Match as Match
     from evplace.placemap import PlaceMap as PlaceMap
+    from evplace.placemap import train as train
     from evplace.places import PlaceGrid as PlaceGrid
     from evplace.places import PlaceRuns as PlaceRuns
-    from evplace.scorers._network.training import TrainSettings as TrainSettings
-    from evplace.scorers._network.training import train as train
+    from evplace.scorers.network import TrainSettings as TrainSettings
     from evplace.sources.cleaning import CleaningSettings as CleaningSettings
     from evplace.sources.readers import Recording as Recording
     from evplace.sources.readers import open_recording as open_recording
@@ -42,11 +45,12 @@ _PUBLIC = {
     "PlaceGrid": "evplace.places",
     "PlaceMap": "evplace.placemap",
     "PlaceRuns": "evplace.places",
+    "Recipe": "evplace.imaging.recipe",
     "Recording": "evplace.sources.readers",
     "Result": "evplace.evaluation",
     "SpacingSettings": "evplace.imaging.spacing",
     "Track": "evplace.sources.tracks",
-    "TrainSettings": "evplace.scorers._network.training",
+    "TrainSettings": "evplace.scorers.network",
     "Traverse": "evplace.imaging.traverse",
     "WindowSettings": "evplace.imaging.windows",
     "compare": "evplace.evaluation",
@@ -55,14 +59,18 @@ _PUBLIC = {
     "open_recording": "evplace.sources.readers",
     "open_track": "evplace.sources.tracks",
     "open_traverse": "evplace.drives.to_traverse",
-    "train": "evplace.scorers._network.training",
+    "train": "evplace.placemap",
 }
 """Public name -> module. Loaded on first use, so that `import evplace` costs numpy at most."""
+_PACKAGES = ("matchers", "scorers")
+"""Families whose parts are objects: `evplace.matchers.Local(K=5)`."""
 
-__all__ = sorted([*_PUBLIC, "__version__"])
+__all__ = sorted([*_PUBLIC, *_PACKAGES, "__version__"])
 
 
 def __getattr__(name: str) -> Any:
+    if name in _PACKAGES:
+        return importlib.import_module(f"evplace.{name}")
     if name not in _PUBLIC:
         raise AttributeError(f"module 'evplace' has no attribute '{name}'")
     return getattr(importlib.import_module(_PUBLIC[name]), name)

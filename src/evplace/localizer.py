@@ -2,30 +2,33 @@
 
     events -> cleaned -> window -> event image -> score row -> matcher's step -> Match
 
-Files, live cameras and evaluation all go this way; the size of the packets changes nothing.
+Files, live cameras and evaluation all go this way; the size of the packets changes nothing. What only
+hindsight knows is asked for by name.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core import settings
-from evplace.core.errors import PlaceMapError, RecordingError
+from evplace.core import families
+from evplace.core.errors import PartError, PlaceMapError, RecordingError
 from evplace.core.events import Events
-from evplace.imaging.images import ImageSettings
+from evplace.core.settings import to_dict
+from evplace.imaging.recipe import shown
 from evplace.imaging.stream import EventImage, EventImages
 from evplace.imaging.traverse import Traverse
-from evplace.imaging.windows import WindowSettings
-from evplace.matchers import Answer, Matcher, Path, open_matcher, resolved_settings
+from evplace.matchers import Answer, Matcher, Matching, Path, stepped
 from evplace.placemap import PlaceMap
-from evplace.scorers import Rows, open_scorer
-from evplace.sources.cleaning import CleaningSettings, MaskSource, read_mask
+from evplace.scorers import OpenScorer, Rows, scorer_of
+from evplace.sources.cleaning import MaskSource, read_mask
 
+Answers = Literal["live", "hindsight"]
+"""What the camera would have been told as it drove; or what is known once the drive is over."""
 State = Literal["localised", "unseen", "no-events"]
 
 
@@ -47,45 +50,53 @@ class Match:
     """localised; unseen: the map has never been here; no-events: the window was empty."""
 
 
+class Answered(NamedTuple):
+    """What a localizer says of a whole traverse."""
+
+    path: Path
+    """One answer an image."""
+    rows: Rows
+    """(n, items) the score rows."""
+    delay: int
+    """Images that came before an answer was known, at most."""
+
+
 class Localizer:
     """Finds a later drive in a map; remembers the drive so far, so take a fresh one for each drive."""
 
     def __init__(
         self,
         place_map: PlaceMap,
-        matcher: str = "local",
+        matcher: str | Matcher = "local",
         preset: str | None = None,
         mask: MaskSource | None = None,
-        **matcher_settings: object,
+        **settings: object,
     ) -> None:
-        """For one map, with a matcher by name, one of its presets, and its settings.
+        """For one map, with a matcher by name, one of its presets, and its settings; or with an object.
 
-        Events are cleaned as those of the map were. Which pixels are hot belongs to the drive, so a map that
-        was learned without hot pixels needs the drive's own `mask` (see `evplace.sources.cleaning.read_mask`,
+        `Localizer(campus, matchers.Local(K=5))` and `Localizer(campus, "local", K=5)` are the same. Events
+        are cleaned as those of the map were. Which pixels are hot belongs to the drive, so a map that was
+        learned without hot pixels needs the drive's own `mask` (see `evplace.sources.cleaning.read_mask`,
         and `pixel_mask` to measure it). Raises SettingsError for an unknown matcher, preset or setting.
         """
         self.map = place_map
-        self.scorer = open_scorer(place_map)
-        self._recipe = (matcher, preset, matcher_settings)
+        self.matcher: Matcher = families.make("matchers", matcher, preset, settings)
+        """The matcher with its settings; `reset` begins with it anew."""
         self.mask = mask
         """Pixels of the drive to leave out; it counts from the first packet of a drive."""
+        with families.blaming("scorers", place_map.scorer):
+            self.scorer: OpenScorer = scorer_of(place_map.scorer).open(place_map.content)
         self.reset()
 
     @property
     def settings(self) -> dict[str, Any]:
         """The resolved settings of the matcher, with its name."""
-        name, preset, values = self._recipe
-        return {"name": name} | resolved_settings(name, preset, **values)
-
-    @property
-    def cleaning(self) -> CleaningSettings:
-        """How the map's events were cleaned, and so are those of a drive."""
-        return settings.make(CleaningSettings, self.map.settings.get("cleaning") or {})
+        return {"name": families.name_of("matchers", self.matcher)} | to_dict(self.matcher)
 
     def reset(self) -> None:
         """Forget the drive so far."""
-        name, preset, values = self._recipe
-        self._matcher: Matcher = open_matcher(name, preset, self.scorer.distances, **values)
+        with families.blaming("matchers", self.matcher):
+            self._matching: Matching = self.matcher.start(self.scorer.distances)
         self._images: EventImages | None = None
         self._times_us: list[int] = []
 
@@ -105,12 +116,16 @@ class Localizer:
     def push_image(self, image: NDArray[np.uint8], t_us: int) -> Iterator[Match]:
         """The matches that become known with one more image (h, w) or (h, w, C)."""
         self._times_us.append(t_us)
-        answer = self._matcher.step(self.rows(image[None])[0])
+        answer = self._step(self.rows(image[None])[0])
         if answer is not None:
             yield self._match(self._times_us[answer.query], answer)
 
     def match_traverse(self, traverse: Traverse) -> Iterator[Match]:
-        """The matches of a traverse's images, as `push` would give them for its events."""
+        """The matches of a traverse's images, as `push` would give them for its events.
+
+        PlaceMapError where its images were not made as the map's.
+        """
+        self.map.require_same(traverse)
         for image, t_us, count in zip(traverse.images, traverse.t_us, traverse.counts, strict=True):
             if count == 0:
                 yield _no_events(int(t_us))
@@ -118,33 +133,65 @@ class Localizer:
                 yield from self.push_image(image, int(t_us))
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
-        """(n, items) score rows of images; PlaceMapError where they are not such as the map was made from."""
+        """(n, items) score rows of images; PlaceMapError where they have not the shape of the map's."""
         if images.shape[1:] != self.map.image_shape:
             raise PlaceMapError(
                 f"the map was made from images of shape {self.map.image_shape}, these are "
-                f"{images.shape[1:]}: make the traverse with the same image settings"
+                f"{images.shape[1:]}: make them with the map's recipe"
             )
-        return self.scorer.rows(images)
+        with families.blaming("scorers", self.map.scorer):
+            rows = self.scorer.rows(images)
+        check_rows(rows, len(images), self.map)
+        return rows
 
-    def path(self, traverse: Traverse, rows: Rows | None = None) -> tuple[Path, Rows]:
-        """A whole traverse in hindsight: one answer an image, and the score rows (n, items).
+    def answers(self, query: Traverse, answers: Answers = "live", rows: Rows | None = None) -> Answered:
+        """One answer for each image of a whole traverse; this localizer forgets what it had seen before.
 
-        Images without events are answered with -1, and their rows are zero. `rows` are what another
-        localizer of this map gave for this traverse, so that they need not be scored again. This localizer
-        forgets what it had seen before.
+        "live": what `push` would have said of each image, from those before it and, where a matcher looks
+        ahead, from as many after it as it waits for. "hindsight": the matcher's `path`, from all images.
+        Images without events are answered with -1, and their rows are zero. `rows` are what another localizer
+        of this map gave for this traverse in the same way, so that they need not be scored again.
+        PlaceMapError where the query's images were not made as the map's.
         """
+        self.map.require_same(query)
         self.reset()
-        filled = np.flatnonzero(traverse.counts != 0)
+        filled = np.flatnonzero(query.counts != 0)
         if rows is None:
-            rows = np.zeros((len(traverse), len(self.map.items)), np.float32)
-            rows[filled] = self.rows(np.asarray(traverse.images[filled]))
-        self._matcher.extend(rows[filled])
-        found = self._matcher.path()
-        item = np.full(len(traverse), -1, np.int64)
-        score = np.full(len(traverse), np.nan)
-        accepted = np.zeros(len(traverse), np.bool_)
+            rows = self._rows_of(query, filled, answers)
+        live = answers == "live"
+        found, delay = stepped(self._step, rows[filled]) if live else self._in_hindsight(rows[filled])
+        item = np.full(len(query), -1, np.int64)
+        score = np.full(len(query), np.nan)
+        accepted = np.zeros(len(query), np.bool_)
         item[filled], score[filled], accepted[filled] = found.item, found.score, found.accepted
-        return Path(item, score, accepted), rows
+        return Answered(Path(item, score, accepted), rows, delay)
+
+    def _rows_of(self, query: Traverse, filled: NDArray[np.int64], answers: Answers) -> Rows:
+        """(n, items): live, image by image, since the size of a batch may change the last bits of a score."""
+        rows = np.zeros((len(query), len(self.map.items)), np.float32)
+        if answers == "live":
+            for at in filled:
+                rows[at] = self.rows(np.asarray(query.images[at : at + 1]))[0]
+        elif len(filled):
+            rows[filled] = self.rows(np.asarray(query.images[filled]))
+        return rows
+
+    def _in_hindsight(self, rows: Rows) -> tuple[Path, int]:
+        with families.blaming("matchers", self.matcher):
+            self._matching.extend(rows)
+            found = self._matching.path()
+        check_path(found, len(rows), self.map, self.matcher)
+        return found, max(0, len(rows) - 1)
+
+    def _step(self, row: Rows) -> Answer | None:
+        with families.blaming("matchers", self.matcher):
+            answer = self._matching.step(row)
+        if answer is not None and not -1 <= answer.item < len(self.map.items):
+            raise PartError(
+                f"{families.described('matchers', self.matcher)} answered item {answer.item} of a map of "
+                f"{len(self.map.items)} items"
+            )
+        return answer
 
     def _matches_of(self, image: EventImage) -> Iterator[Match]:
         if image.window.events:
@@ -162,18 +209,42 @@ class Localizer:
         return Match(t_us, answer.item, int(self.map.items.place[answer.item]), position, answer.score, state)
 
     def _open_images(self, events: Events) -> EventImages:
-        if self.map.settings.get("input") != "events":
-            raise PlaceMapError("the map was made from camera images: it cannot localise events")
-        learned = self.map.settings["sensor"]
-        if list(events.size) != list(learned):
+        recipe = self.map.recipe
+        if recipe is None or recipe.kind != "events":
+            made = "camera images" if recipe is not None else "images whose making is not known"
+            raise PlaceMapError(f"the map was made from {made}: it cannot localise events")
+        if recipe.size is not None and tuple(events.size) != recipe.size:
             raise RecordingError(
-                f"the map was made with a sensor of {learned[0]}x{learned[1]} pixels, "
-                f"this recording has {events.size[0]}x{events.size[1]}"
+                f"the map was made with a sensor of {shown(recipe.size)} pixels, this recording has "
+                f"{shown(tuple(events.size))}: give the map's own sensor, or train a map with this one"
             )
-        windows = settings.make(WindowSettings, self.map.settings["windows"])
-        images = settings.make(ImageSettings, self.map.settings["images"])
         mask = None if self.mask is None else read_mask(self.mask, events.size)
-        return EventImages(events.size, windows, images, self.cleaning, mask)
+        return EventImages(events.size, recipe, mask)
+
+
+def check_rows(rows: object, images: int, place_map: PlaceMap) -> None:
+    """PartError where a scorer gives anything but finite (images, items) scores."""
+    wanted = (images, len(place_map.items))
+    if isinstance(rows, np.ndarray) and rows.shape == wanted and np.isfinite(rows).all():
+        return
+    kind = f"{rows.dtype} {rows.shape}" if isinstance(rows, np.ndarray) else type(rows).__name__
+    unfinite = " with NaN or infinity" if isinstance(rows, np.ndarray) and rows.shape == wanted else ""
+    raise PartError(
+        f"{families.described('scorers', place_map.scorer)} must give finite scores {wanted} for {images} "
+        f"images and {wanted[1]} items, it gave {kind}{unfinite}"
+    )
+
+
+def check_path(found: Path, queries: int, place_map: PlaceMap, matcher: Matcher) -> None:
+    """PartError where a matcher's path is not one answer a query, of the map's items."""
+    shapes = {np.shape(column) for column in found}
+    item = np.asarray(found.item)
+    if shapes == {(queries,)} and np.all((item >= -1) & (item < len(place_map.items))):
+        return
+    raise PartError(
+        f"{families.described('matchers', matcher)} must answer each of {queries} queries with an item of "
+        f"{len(place_map.items)} or -1, its answers have the shapes {sorted(shapes)}"
+    )
 
 
 def _no_events(t_us: int) -> Match:

@@ -1,13 +1,15 @@
 """PlaceMap: what learning a route leaves behind, and all that localising needs.
 
-On disk it is a folder: map.json (scorer, places, settings), items.npy (where each map item is), drive.npy
-(where each image of the drive was taken), the network as weights.safetensors and network.onnx, or the
-reference images as references.npy, and SHA256SUMS over all of them, which `sha256sum -c` checks too. A
-damaged file is found on loading, before it answers anything.
+On disk it is a folder: map.json (scorer, places, recipe), items.npy (where each map item is), drive.npy
+(where each image of the drive was taken), what the scorer has learned (references.npy, or network.onnx and
+weights.safetensors), and SHA256SUMS over all of them, which `sha256sum -c` checks too. A damaged file is
+found on loading, before it answers anything.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,15 +17,30 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace import places
-from evplace.core.errors import InputError, PlaceMapError
+from evplace import places as places_of
+from evplace.core import families
+from evplace.core.errors import EvplaceError, InputError, PlaceMapError
+from evplace.core.settings import to_dict
 from evplace.core.storage import new_folder, read_array, read_json, sha256, write_json
+from evplace.drives.to_traverse import open_traverse
+from evplace.imaging.recipe import Recipe
+from evplace.imaging.traverse import MARK as TRAVERSE
+from evplace.imaging.traverse import Traverse
 from evplace.places import Places
+from evplace.scorers import REFERENCES, Content, Descriptor, Learned, Learning, Scorer, scorer_of, usable
+from evplace.sources.cleaning import MaskSource
+from evplace.sources.tracks import Track
 
-FORMAT = "evplace-map-1"
+FORMAT = "evplace-map-2"
+OLD_FORMAT = "evplace-map-1"
+"""Its recipe and scorer lie in pieces in `settings`."""
 SUMS = "SHA256SUMS"
 MARK = "map.json"
 """What tells a folder that was written here from any other: only such a one is replaced."""
+MOST_IMAGES = 100_000_000
+"""Images of a drive that are believed: half a year at 1/60 s would be more."""
+_NAME = re.compile(r"[a-z][a-z0-9_-]*(\.[a-z0-9]+)?")
+"""What scorers may call their content."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +53,8 @@ class Items:
     """(items, 2) easting and northing in metres, NaN where unknown."""
     heading_deg: NDArray[np.float64]
     """(items,) clockwise from north, NaN where unknown or where an item has many."""
+    are_places: bool = False
+    """Whether there is one item a place, not one a reference image."""
 
     def __len__(self) -> int:
         return len(self.place)
@@ -45,8 +64,8 @@ class Items:
 class PlaceMap:
     """A learned route."""
 
-    scorer: str
-    """Which scorer reads it: network, ncc, ..."""
+    scorer: Scorer | Descriptor
+    """What compares images with it, with its settings."""
     places: Places
     """The places and the rule of what counts as the same place."""
     items: Items
@@ -54,96 +73,310 @@ class PlaceMap:
     drive: NDArray[np.float64]
     """(images, 3) easting, northing and heading of each image that the map was learned from, NaN where
     unknown: it tells whether the map has a view, not only a place."""
-    settings: dict[str, Any] = field(default_factory=dict)
-    """How it was made: source, sensor, windows, images, train, scorer, zone."""
-    network: bytes | None = None
-    """The trained network as ONNX."""
-    weights: dict[str, NDArray[np.float32]] = field(default_factory=dict)
-    """The trained network's weights."""
-    references: NDArray[np.uint8] | None = None
-    """(items, h, w) or (items, h, w, C): the reference images of image scorers."""
+    content: Content
+    """What the scorer has learned: arrays and files by their names."""
+    image_shape: tuple[int, ...]
+    """Shape of the images that it was learned from: (h, w) or (h, w, C)."""
+    recipe: Recipe | None = None
+    """How those images were made, and how a query's are; None where that is not known."""
+    zone: tuple[int, bool] | None = None
+    """UTM zone and whether it is northern, of all metres; None without positions."""
+    info: dict[str, Any] = field(default_factory=dict)
+    """Where it comes from: the source of its drive, how its images were chosen."""
 
     @property
-    def items_are_places(self) -> bool:
-        """Whether a score row has one entry a place (a network), not one a reference image."""
-        return self.references is None
+    def references(self) -> NDArray[np.uint8] | None:
+        """(items, h, w) or (items, h, w, C): the reference images, where these are the items."""
+        images = self.content.get(REFERENCES)
+        return images if isinstance(images, np.ndarray) else None
 
     @property
-    def image_shape(self) -> tuple[int, ...]:
-        """Shape of the images that it was learned from: (h, w) or (h, w, C)."""
-        return tuple(self.settings["image_shape"])
+    def settings(self) -> dict[str, Any]:
+        """How it was made, as plain values: what is saved with every result."""
+        return {
+            "scorer": _scorer_to_dict(self.scorer),
+            "recipe": None if self.recipe is None else self.recipe.to_dict(),
+            "image_shape": list(self.image_shape),
+            "zone": None if self.zone is None else list(self.zone),
+            "info": self.info,
+        }
+
+    def open(
+        self,
+        path: str | Path,
+        track: str | Path | Track | None = None,
+        time_unit: str | None = None,
+        mask: MaskSource | None = None,
+        drive: str | None = None,
+        dataset: str | None = None,
+        **settings: object,
+    ) -> Traverse:
+        """A later drive, its images made exactly as this map's; see `open_traverse` for what `path` may be.
+
+        Raises TraverseError where that cannot be: for a traverse that was made otherwise, another sensor, and
+        `settings` that are not the map's own.
+        """
+        recipe = self.recipe
+        if (Path(path) / TRAVERSE).exists():
+            made = open_traverse(path, track, None, time_unit, None, mask, drive, dataset, **settings)
+            self.require_same(made)
+            return made
+        if recipe is not None and settings:
+            recipe.require_same(
+                recipe.changed(**settings),
+                "the map",
+                "what is asked for",
+                "leave that out, or train the map so",
+            )
+        return open_traverse(path, track, recipe, time_unit, None, mask, drive, dataset, **settings)
+
+    def require_same(self, query: Traverse) -> None:
+        """PlaceMapError where a query's images were not made as this map's: they cannot be compared."""
+        shape = query.images.shape[1:]
+        if shape != self.image_shape:
+            raise PlaceMapError(
+                f"the map was made from images of shape {self.image_shape}, the query's are {shape}: make "
+                "the query with the map's recipe (`PlaceMap.open`, or evplace evaluate on its recording)"
+            )
+        if self.recipe is not None and query.recipe is not None:
+            self.recipe.require_same(
+                query.recipe, "the map", "the query", "make the query from its recording by `PlaceMap.open`, "
+                "which evplace localize and evaluate do by themselves",
+            )  # fmt: skip
 
     def save(self, path: str | Path, overwrite: bool = False) -> None:
         """Write the folder `path`; OutputError where it exists or cannot be written."""
         with new_folder(path, overwrite, MARK) as folder:
-            if self.network is not None:
-                from safetensors.numpy import save_file
-
-                (folder / "network.onnx").write_bytes(self.network)
-                save_file(self.weights, folder / "weights.safetensors")
-            if self.references is not None:
-                np.save(folder / "references.npy", self.references)
+            for name, value in self.content.items():
+                _write_content(folder, name, value)
             columns = [self.items.place, *self.items.position.T, self.items.heading_deg]
             np.save(folder / "items.npy", np.stack(columns, axis=1).astype(np.float64))
             np.save(folder / "drive.npy", self.drive)
             description = {
                 "format": FORMAT,
-                "scorer": self.scorer,
+                **self.settings,
                 "places": self.places.to_dict(),
-                "settings": self.settings,
+                "items": "places" if self.items.are_places else "images",
+                "content": [_file_of(name, value) for name, value in self.content.items()],
             }
             write_json(folder / MARK, description)
             sums = [f"{sha256(file)}  {file.name}\n" for file in sorted(folder.iterdir())]
             (folder / SUMS).write_text("".join(sums), "ascii")
 
     @classmethod
-    def load(cls, path: str | Path) -> PlaceMap:
-        """The map in the folder `path`; PlaceMapError where it is none, or a byte of it has changed."""
+    def load(cls, path: str | Path, scorer: Scorer | Descriptor | None = None) -> PlaceMap:
+        """The map in the folder `path`; PlaceMapError where it is none, or a byte of it has changed.
+
+        `scorer` opens a map whose scorer no installed package offers: the object that it was trained with.
+        """
         folder = Path(path)
         what = f"the map {folder}"
-        if not (folder / MARK).exists():
+        if not (folder / MARK).is_file():
             raise PlaceMapError(f"{folder} is no map: a map is a folder that `evplace train` has written")
-        _check_sums(folder)
         try:
-            description = read_json(folder / MARK, what)
-            if description.get("format") != FORMAT:
-                raise PlaceMapError(f"{what} has the format {description.get('format')}, this is {FORMAT}")
-            columns = read_array(folder / "items.npy", what)
-            drive = read_array(folder / "drive.npy", what)
+            about = _about(folder, what)
+            _check_sums(folder, what, {MARK, "items.npy", "drive.npy", *about["content"]})
+            place_map = cls(
+                scorer=_scorer_from(about["scorer"], what) if scorer is None else scorer,
+                places=places_of.from_dict(about["places"]),
+                items=_items(folder, about, what),
+                drive=read_array(folder / "drive.npy", what),
+                content={name.removesuffix(".npy"): _read(folder / name, what) for name in about["content"]},
+                image_shape=tuple(about["image_shape"]),
+                recipe=None if about["recipe"] is None else Recipe.from_dict(about["recipe"]),
+                zone=None if about["zone"] is None else (about["zone"][0], about["zone"][1]),
+                info=about["info"],
+            )
+            _check_fit(place_map, what)
         except PlaceMapError:
             raise
-        except InputError as error:
-            raise PlaceMapError(str(error)) from error
-        return cls(
-            scorer=description["scorer"],
-            places=places.from_dict(description["places"]),
-            items=Items(columns[:, 0].astype(np.int64), columns[:, 1:3], columns[:, 3]),
-            drive=drive,
-            settings=description["settings"],
-            **_content(folder, what),
+        except (InputError, EvplaceError) as error:
+            raise PlaceMapError(f"{error}" if what in str(error) else f"{what}: {error}") from error
+        return place_map
+
+
+def train(
+    reference: Traverse,
+    places: Places,
+    scorer: str | Scorer | Descriptor = "network",
+    preset: str | None = None,
+    learning: Learning | None = None,
+    **settings: object,
+) -> PlaceMap:
+    """Learn the map of `places` from the traverse `reference`.
+
+    `scorer` is a name, with `settings` over those of its `preset`, or an object such as
+    `scorers.NCC(sigma=1)`: network is trained; to ncc and the like the images themselves are the map. Raises
+    SettingsError for an unknown name or setting, TraverseError where no image has a place.
+    """
+    part: Scorer | Descriptor = families.make("scorers", scorer, preset, settings)
+    _, used = usable(reference, places)
+    track = reference.track
+    heading = track.heading_deg if track is not None else np.full(len(reference), np.nan)
+    drive = np.column_stack([reference.xy, heading])
+    with families.blaming("scorers", part):
+        learned = scorer_of(part).learn(reference, places, learning or Learning())
+    return PlaceMap(
+        part,
+        places,
+        _learned_items(learned, reference, places, drive),
+        drive[used],
+        learned.content,
+        reference.images.shape[1:],
+        reference.recipe,
+        (track.zone, track.northern) if track is not None else None,
+        {key: reference.info[key] for key in ("source", "spacing") if key in reference.info},
+    )
+
+
+def _learned_items(
+    learned: Learned, reference: Traverse, places: Places, drive: NDArray[np.float64]
+) -> Items:
+    if learned.images is None:
+        return Items(np.arange(places.n), places.centres(), np.full(places.n, np.nan), are_places=True)
+    labels = places.label(places.where(reference.xy))
+    chosen = drive[learned.images]
+    return Items(labels[learned.images], chosen[:, :2], chosen[:, 2])
+
+
+def _scorer_to_dict(scorer: Scorer | Descriptor) -> dict[str, Any]:
+    return {
+        "name": families.name_of("scorers", scorer),
+        "package": families.package_of(scorer),
+        "settings": to_dict(scorer),
+    }
+
+
+def _scorer_from(values: Mapping[str, Any], what: str) -> Scorer | Descriptor:
+    name, package = values["name"], values.get("package")
+    if name not in families.names("scorers"):
+        raise PlaceMapError(
+            f"{what} wants the scorer '{name}' of the package '{package}', which is not installed: install "
+            "it, or hand the scorer in: PlaceMap.load(path, scorer)"
+        )
+    part: Scorer | Descriptor = families.make("scorers", name, values=values["settings"])
+    return part
+
+
+_SHAPE: dict[str, tuple[type, ...]] = {
+    "scorer": (dict,), "places": (dict,), "recipe": (dict, type(None)), "image_shape": (list,),
+    "zone": (list, type(None)), "info": (dict,), "items": (str,), "content": (list,),
+}  # fmt: skip
+"""What map.json holds: a name and the kinds of JSON that it may be."""
+
+
+def _about(folder: Path, what: str) -> dict[str, Any]:
+    """map.json, each entry of the kind that it must be; of the format before, as of this one."""
+    about = read_json(folder / MARK, what)
+    if about.get("format") == OLD_FORMAT:
+        about = _of_old_format(about, (folder / "references.npy").exists(), what)
+    elif about.get("format") != FORMAT:
+        raise PlaceMapError(f"{what} has the format {about.get('format')!r}, this version reads {FORMAT}")
+    for name, kinds in _SHAPE.items():
+        if name not in about or not isinstance(about[name], kinds):
+            raise PlaceMapError(f"{what} is damaged: '{name}' in {MARK} is missing or of a wrong kind")
+    shape, zone, scorer = about["image_shape"], about["zone"], about["scorer"]
+    if not (len(shape) in (2, 3) and all(type(side) is int and 0 < side < 1 << 16 for side in shape)):
+        raise PlaceMapError(f"{what} is damaged: images of shape {shape!r}")
+    if zone is not None and not (
+        len(zone) == 2 and type(zone[0]) is int and 0 <= zone[0] <= 60 and isinstance(zone[1], bool)
+    ):
+        raise PlaceMapError(f"{what} is damaged: {zone!r} is no UTM zone")
+    if not isinstance(scorer.get("name"), str) or not isinstance(scorer.get("settings"), dict):
+        raise PlaceMapError(f"{what} is damaged: its scorer is {scorer!r}")
+    if not all(isinstance(name, str) and _NAME.fullmatch(name) for name in about["content"]):
+        raise PlaceMapError(f"{what} is damaged: its content is {about['content']!r}")
+    return about
+
+
+def _of_old_format(about: dict[str, Any], has_references: bool, what: str) -> dict[str, Any]:
+    settings = about.get("settings")
+    if not isinstance(settings, dict):
+        raise PlaceMapError(f"{what} is damaged: 'settings' in {MARK} is missing or of a wrong kind")
+    of_scorer = settings.get("scorer") or {}
+    if "train" in settings:
+        trained = settings["train"]
+        of_scorer = trained if about.get("scorer") == "network" else {**of_scorer, "network": trained}
+    recipe = {key: settings.get(key) for key in ("windows", "images", "cleaning")}
+    recipe |= {"kind": settings.get("input"), "size": settings.get("sensor")}
+    return {
+        "scorer": {"name": about.get("scorer"), "package": "evplace", "settings": of_scorer},
+        "places": about.get("places"),
+        "recipe": None if settings.get("images") is None else recipe,
+        "image_shape": settings.get("image_shape"),
+        "zone": settings.get("zone"),
+        "info": {key: settings[key] for key in ("source", "spacing") if settings.get(key) is not None},
+        "items": "images" if has_references else "places",
+        "content": ["references.npy"] if has_references else ["network.onnx", "weights.safetensors"],
+    }
+
+
+def _items(folder: Path, about: Mapping[str, Any], what: str) -> Items:
+    columns = read_array(folder / "items.npy", what)
+    if columns.ndim != 2 or columns.shape[1] != 4 or columns.dtype != np.float64 or not len(columns):
+        raise PlaceMapError(f"{what} is damaged: items of shape {columns.shape}, {columns.dtype}")
+    place = columns[:, 0]
+    if not np.all((place >= -1) & (place < MOST_IMAGES) & (place == np.floor(place))):
+        raise PlaceMapError(f"{what} is damaged: its items name places that cannot be")
+    are_places = about["items"] == "places"
+    return Items(place.astype(np.int64), columns[:, 1:3], columns[:, 3], are_places)
+
+
+def _check_fit(place_map: PlaceMap, what: str) -> None:
+    """PlaceMapError where the parts of a map are not of one map."""
+    items, places = place_map.items, place_map.places
+    if places.n > MOST_IMAGES or (items.are_places and len(items) != places.n):
+        raise PlaceMapError(f"{what} is damaged: {len(items)} items for {places.n} places")
+    if items.place.max() >= places.n:
+        raise PlaceMapError(f"{what} is damaged: an item of place {items.place.max()} of {places.n}")
+    drive = place_map.drive
+    if drive.ndim != 2 or drive.shape[1] != 3 or drive.dtype != np.float64 or np.isinf(drive).any():
+        raise PlaceMapError(f"{what} is damaged: its drive is {drive.dtype} {drive.shape}")
+    if np.isinf(items.position).any() or np.isinf(items.heading_deg).any():
+        raise PlaceMapError(f"{what} is damaged: its items lie at infinity")
+    images = place_map.references
+    if images is not None and (
+        images.dtype != np.uint8 or images.shape != (len(items), *place_map.image_shape)
+    ):
+        raise PlaceMapError(
+            f"{what} is damaged: references of shape {images.shape} for {len(items)} items of "
+            f"{place_map.image_shape}"
         )
 
 
-def _content(folder: Path, what: str) -> dict[str, Any]:
-    if (folder / "references.npy").exists():
-        return {"references": read_array(folder / "references.npy", what, memory_mapped=True)}
-    from safetensors.numpy import load_file
-
-    weights = load_file(folder / "weights.safetensors")
-    return {"network": (folder / "network.onnx").read_bytes(), "weights": weights}
+def _file_of(name: str, value: NDArray[Any] | bytes) -> str:
+    file = name if isinstance(value, bytes) else f"{name}.npy"
+    if not _NAME.fullmatch(file) or file in (MARK, "items.npy", "drive.npy"):
+        raise PlaceMapError(f"a scorer cannot call its content '{name}': lower-case letters and one suffix")
+    return file
 
 
-def _check_sums(folder: Path) -> None:
+def _write_content(folder: Path, name: str, value: NDArray[Any] | bytes) -> None:
+    file = folder / _file_of(name, value)
+    if isinstance(value, bytes):
+        file.write_bytes(value)
+    else:
+        np.save(file, value)
+
+
+def _read(file: Path, what: str) -> NDArray[Any] | bytes:
+    if file.suffix == ".npy":
+        return read_array(file, what, memory_mapped=True)
+    return file.read_bytes()
+
+
+def _check_sums(folder: Path, what: str, needed: set[str]) -> None:
+    """PlaceMapError where SHA256SUMS does not name just the files that are read, or a byte has changed."""
     try:
         lines = (folder / SUMS).read_text("ascii").splitlines()
         sums = {name: wanted for wanted, name in (line.split("  ", 1) for line in lines)}
     except (OSError, ValueError) as error:
-        raise PlaceMapError(f"the map {folder} has no readable {SUMS}: train it again ({error})") from error
-    for name, wanted in sums.items():
+        raise PlaceMapError(f"{what} has no readable {SUMS}: train it again ({error})") from error
+    for name in sorted(needed | set(sums)):
         file = folder / name
-        if not file.exists():
-            raise PlaceMapError(f"the map {folder} lacks {name}: copy it again or train it again")
-        if sha256(file) != wanted:
-            raise PlaceMapError(
-                f"the map {folder} is damaged: {name} has changed since it was saved; copy it again"
-            )
+        if name not in sums or name not in needed:
+            raise PlaceMapError(f"{what} is damaged: {SUMS} and {MARK} do not name the same files ({name})")
+        if not file.is_file() or file.is_symlink():
+            raise PlaceMapError(f"{what} lacks {name}: copy it again or train it again")
+        if sha256(file) != sums[name]:
+            raise PlaceMapError(f"{what} is damaged: {name} has changed since it was saved; copy it again")

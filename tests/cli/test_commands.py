@@ -68,8 +68,9 @@ def test_settings_come_from_a_file_and_flags_win(files: Path, tmp_path: Path, ca
     out = ("images", files / "day.aedat4", "-o", tmp_path / "day", "--settings", toml)
     assert said(capsys, *out)["shape"] == [90, 40]
     assert said(capsys, *out, "--overwrite", "--width", "50")["shape"] == [90, 50]
-    info = json.loads((tmp_path / "day" / "traverse.json").read_text())["info"]
-    assert (info["windows"]["dt"], info["images"]["blur"]) == ("1/15", False)
+    recipe = Traverse.load(tmp_path / "day").recipe
+    assert recipe is not None
+    assert (recipe.windows.dt, recipe.images.blur) == ("1/15", False)
 
 
 def test_train_localize_evaluate_compare(files: Path, street: Path, tmp_path: Path, capsys: Capture) -> None:
@@ -109,7 +110,7 @@ def test_the_network_from_the_command_line(files: Path, tmp_path: Path, capsys: 
     out = ("train", files / "day.aedat4", "--track", files / "day.csv", "-o", tmp_path / "net.evp")
     facts = said(capsys, *out, "--preset", "paper", "--steps", 3, "--batch", 8)
     assert (facts["scorer"], facts["items"]) == ("network", facts["places"])
-    train = json.loads((tmp_path / "net.evp" / "map.json").read_text())["settings"]["train"]
+    train = json.loads((tmp_path / "net.evp" / "map.json").read_text())["scorer"]["settings"]
     assert (train["last_relu"], train["steps"]) == (True, 3)
 
 
@@ -187,8 +188,9 @@ def test_a_settings_file_may_say_a_default(tmp_path: Path, capsys: Capture) -> N
     for number, blur in enumerate((True, False)):
         toml.write_text(f"json = false\n[images]\nblur = {str(blur).lower()}\n[cleaning]\nmask_hot = false\n")
         said(capsys, *command, tmp_path / f"{number}")
-        info = json.loads((tmp_path / f"{number}" / "traverse.json").read_text())["info"]
-        assert info["images"]["blur"] is blur
+        recipe = Traverse.load(tmp_path / f"{number}").recipe
+        assert recipe is not None
+        assert recipe.images.blur is blur
 
 
 def test_a_track_that_needs_settings(tmp_path: Path, capsys: Capture) -> None:

@@ -230,7 +230,9 @@ def test_zero_images(folder: Path, capsys: Capture) -> None:
 
 def test_a_map_of_other_settings_or_of_another_sensor(folder: Path, street: Path, capsys: Capture) -> None:
     main(["images", f"{folder}/day.aedat4", "-o", f"{folder}/narrow", "--width", "40"])
-    assert "image settings" in fault(capsys, "localize", street, folder / "narrow")
+    assert "the map was made with width 160, the query with 40" in fault(
+        capsys, "localize", street, folder / "narrow"
+    )
     other = Events.of([0, 5], [0, 1], [0, 1], [1, 1], (320, 240))
     write_recording(folder / "other.aedat4", [other], (320, 240))
     assert "80x60" in fault(capsys, "localize", street, folder / "other.aedat4")

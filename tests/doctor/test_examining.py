@@ -10,13 +10,13 @@ import pytest
 from examined import SIZE, noise, outcome, road
 
 from conftest import make_drive, write_drive
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import InputError, OutputError, SettingsError, TrackError
 from evplace.core.events import Events
 from evplace.doctor import STATES, Examination, as_json, draw, examine
 from evplace.sources.writers import write_recording
 
-PARTS = [plugs.load("doctor", name) for name in plugs.names("doctor")]
+PARTS = [families.load("doctor", name) for name in families.names("doctor")]
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.__name__.rpartition(".")[2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import json
 from collections.abc import Sequence
@@ -17,12 +18,12 @@ from evplace.cli import main
 from evplace.core.errors import RecordingError, SettingsError, TraverseError
 from evplace.core.events import Events
 from evplace.drives.to_traverse import open_traverse
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.stream import EventImages, images_of
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer, Match
-from evplace.placemap import PlaceMap
+from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
-from evplace.scorers._network.training import train
 from evplace.sources.cleaning import CleaningSettings, pixel_mask, read_mask
 
 HOT = ((5, 7), (40, 20), (79, 59))
@@ -62,13 +63,14 @@ def noisy(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 @pytest.fixture(scope="module")
 def clean_map(day: Traverse, places: PlaceGrid) -> PlaceMap:
     """A map whose drives are cleaned of hot pixels."""
-    info = day.info | {"cleaning": {"mask_hot": True, "refractory_us": 100}}
-    return train(Traverse(day.images, day.t_us, day.counts, day.track, info), places, scorer="ncc")
+    assert day.recipe is not None
+    recipe = day.recipe.changed(mask_hot=True, refractory_us=100)
+    return train(dataclasses.replace(day, recipe=recipe), places, scorer="ncc")
 
 
 def images(parts: Sequence[Events], cleaning: CleaningSettings) -> tuple[np.ndarray, dict[str, int]]:
     mask = pixel_mask(parts, NOISY.events.size, cleaning)
-    stream = EventImages(NOISY.events.size, cleaning=cleaning, mask=mask)
+    stream = EventImages(NOISY.events.size, Recipe(cleaning=cleaning), mask)
     found = [image for image, _ in images_of(parts, stream)]
     return np.stack(found), stream.cleaned
 
@@ -94,7 +96,7 @@ def test_nothing_is_cleaned_by_default() -> None:
 
 
 def test_masked_images_are_those_of_events_without_hot_pixels(noisy: tuple[Path, Path]) -> None:
-    found = open_traverse(noisy[0], cleaning=CleaningSettings(mask_hot=True))
+    found = open_traverse(noisy[0], mask_hot=True)
     assert found.mask is not None
     assert {(x, y) for y, x in np.argwhere(found.mask)} == set(HOT)
     hot = np.zeros((60, 80), np.bool_)
@@ -134,7 +136,7 @@ def test_commands_clean_later_drives_as_the_map_was(
     recording, track = noisy
     learn = ["train", str(recording), "--track", str(track), "-o", f"{tmp_path}/m", "--scorer", "ncc"]
     assert main([*learn, "--mask-hot", "--refractory-us", "500"]) == 0
-    assert json.loads((tmp_path / "m" / "map.json").read_text())["settings"]["cleaning"]["mask_hot"]
+    assert PlaceMap.load(tmp_path / "m").recipe.cleaning.mask_hot
     flags = ["--mask-hot", "--refractory-us", "500"]
     assert main(["images", str(recording), "-o", f"{tmp_path}/n", "--track", str(track), *flags]) == 0
     answers = []
@@ -159,11 +161,11 @@ def test_commands_clean_later_drives_as_the_map_was(
 
 def test_images_that_are_made_are_not_cleaned_again(noisy: tuple[Path, Path], tmp_path: Path) -> None:
     open_traverse(noisy[0]).save(tmp_path / "plain")
-    with pytest.raises(TraverseError, match="make them again"):
-        open_traverse(tmp_path / "plain", cleaning=CleaningSettings(mask_hot=True))
-    with pytest.raises(TraverseError, match="give the mask to `evplace images`"):
+    with pytest.raises(TraverseError, match="mask_hot False, not True: make it again"):
+        open_traverse(tmp_path / "plain", mask_hot=True)
+    with pytest.raises(TraverseError, match="'mask' cannot change them"):
         open_traverse(tmp_path / "plain", mask=np.zeros((60, 80), np.bool_))
-    assert len(open_traverse(tmp_path / "plain", cleaning=CleaningSettings())) == 60
+    assert len(open_traverse(tmp_path / "plain", mask_hot=False)) == 60
 
 
 def test_camera_images_are_not_cleaned(tmp_path: Path) -> None:
@@ -171,7 +173,7 @@ def test_camera_images_are_not_cleaned(tmp_path: Path) -> None:
 
     Image.fromarray(np.zeros((20, 30), np.uint8)).save(tmp_path / "0.png")
     with pytest.raises(TraverseError, match="no events to clean"):
-        open_traverse(tmp_path, cleaning=CleaningSettings(refractory_us=5))
+        open_traverse(tmp_path, refractory_us=5)
 
 
 def test_masks_of_every_kind(tmp_path: Path) -> None:

@@ -11,9 +11,8 @@ from evplace.core.errors import EvaluationError
 from evplace.evaluation._evaluate import evaluate, truth_of
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
-from evplace.placemap import PlaceMap
+from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid, PlaceRuns
-from evplace.scorers._network.training import train
 from evplace.sources.tracks import Track
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from evplace.core.errors import SettingsError
-from evplace.evaluation.sweeps import SWEPT, sweep
+from evplace.core.families import make
+from evplace.evaluation.sweeps import sweep
 from evplace.matchers import open_matcher
 
 
@@ -33,7 +34,9 @@ CASES = [
 @pytest.mark.parametrize("distances", [False, True])
 def test_every_point_is_what_the_matcher_answers_there(name, parameter, others, distances) -> None:
     scores = scene() - 1 if distances else scene()
-    points = list(sweep(name, scores, None, parameter, distances=distances, **others))
+    points = list(
+        sweep(make("matchers", name, values=others), scores, None, parameter, distances, "hindsight")
+    )
     assert len(points) > 10
     if parameter == "threshold" and name == "seqslam":
         others = {**others, "selection": "threshold"}
@@ -46,17 +49,25 @@ def test_every_point_is_what_the_matcher_answers_there(name, parameter, others, 
 
 def test_the_last_point_accepts_all_that_was_found() -> None:
     for name in ("best", "seqslam", "dp", "hmm"):
-        *_, (_, path) = sweep(name, scene())
+        *_, (_, path) = sweep(make("matchers", name), scene())
         np.testing.assert_array_equal(path.accepted, np.isfinite(path.score))
 
 
 def test_given_values_are_kept_in_their_order() -> None:
-    assert [value for value, _ in sweep("local", scene(), [0.9, 0.1, 0.5])] == [0.9, 0.1, 0.5]
+    assert [value for value, _ in sweep(make("matchers", "local"), scene(), [0.9, 0.1, 0.5])] == [
+        0.9,
+        0.1,
+        0.5,
+    ]
 
 
-def test_every_matcher_but_new_ones_has_a_parameter() -> None:
-    assert SWEPT["graph"] == "m"
+def test_each_matcher_says_what_its_curve_is_drawn_over() -> None:
+    usual = {name: make("matchers", name).sweep().parameter for name in ("best", "local", "seqslam", "graph")}
+    assert usual == {"best": "threshold", "local": "tau1", "seqslam": "mu", "graph": "m"}
+
+
+def test_any_setting_can_be_swept_with_a_run_for_each_value() -> None:
+    for _, path in sweep(make("matchers", "hmm"), scene(), [0.5, 0.9], "steady"):
+        assert len(path.item) == 60
     with pytest.raises(SettingsError, match="unknown setting 'tau3'"):
-        list(sweep("best", scene(), tau3=1))
-    with pytest.raises(SettingsError, match="none of the matchers"):
-        list(sweep("bst", scene()))
+        list(sweep(make("matchers", "best"), scene(), [1.0], "tau3"))

@@ -12,6 +12,7 @@ from evplace.core.errors import RecordingError, SettingsError, TraverseError
 from evplace.core.events import Events
 from evplace.imaging.images import Imager, ImageSettings, event_image, frame_image
 
+CHANNELS = {"polarity": (2,), "voxel": (5,)}
 SIZES = [(320, 240), (640, 480), (346, 260), (1280, 720), (128, 128), (80, 80), (7, 7), (2000, 1500)]
 
 
@@ -96,7 +97,7 @@ def test_pieces_of_a_window_make_the_same_image() -> None:
             pieces.add(part)
         image = whole.image(30_000)
         assert (image == pieces.image(30_000)).all(), kind
-        assert image.shape == ((90, 160) if settings.channels == 1 else (90, 160, settings.channels))
+        assert image.shape == (90, 160, *CHANNELS.get(settings.representation, ()))
 
 
 def on_its_own_grid(kind: str, **settings: object) -> ImageSettings:

@@ -17,9 +17,11 @@ from conftest import Drive, make_drive, write_drive
 from evplace.cli import main
 from evplace.core.errors import SettingsError, TrackError, TraverseError
 from evplace.core.events import Events
-from evplace.drives.to_traverse import open_traverse, record_events
+from evplace.drives.datasets import Drive as Found
+from evplace.drives.to_traverse import open_traverse, record
 from evplace.imaging.spacing import Spacer, SpacingSettings
 from evplace.imaging.traverse import Traverse, new_traverse
+from evplace.placemap import PlaceMap
 from evplace.sources.readers._recording import Recording
 from evplace.sources.readers._source import Block, Source
 from evplace.sources.tracks import Track
@@ -40,7 +42,7 @@ def fields_of(events: Events) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nd
 
 def captured(folder: Path, edges: list[int], spacing: SpacingSettings, drive: Drive = DRIVE) -> Traverse:
     with new_traverse(folder, {}, overwrite=True) as writer:
-        record_events(in_packets(drive.events, edges), writer, track=drive.track, spacing=spacing)
+        record(Found(in_packets(drive.events, edges)), writer, track=drive.track, spacing=spacing)
     return Traverse.load(folder)
 
 
@@ -156,8 +158,7 @@ def test_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     toml.write_text("[spacing]\nevery_m = 5\n")
     learn = ["train", str(recording), "--track", str(track), "--scorer", "ncc", "--settings", str(toml)]
     assert main([*learn, "-o", f"{tmp_path}/m"]) == 0
-    settings_of = json.loads((tmp_path / "m" / "map.json").read_text())["settings"]
-    assert settings_of["spacing"]["every_m"] == 5
+    assert PlaceMap.load(tmp_path / "m").info["spacing"]["every_m"] == 5
     assert len(np.load(tmp_path / "m" / "references.npy")) == 20
 
 
@@ -178,7 +179,7 @@ def test_a_track_of_another_time_is_told(tmp_path: Path, spacing: SpacingSetting
         pytest.raises(TrackError, match="do not overlap"),
         new_traverse(tmp_path / "x", {}) as writer,
     ):
-        record_events(recording, writer, track=track, spacing=spacing)
+        record(Found(recording), writer, track=track, spacing=spacing)
     assert (len(read) < len(DRIVE.events) / 2000) == (shift_us < 0)
 
 

@@ -11,7 +11,7 @@ from PIL import Image
 from conftest import Drive
 from evplace.core.errors import OutputError, TrackError, TraverseError
 from evplace.drives.to_traverse import open_traverse
-from evplace.imaging.images import ImageSettings
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import Traverse, new_traverse
 from evplace.imaging.windows import WindowSettings
 from evplace.sources.tracks import Track
@@ -41,7 +41,7 @@ def test_a_recording_becomes_its_event_images(night_drive: Drive, night: Travers
     np.testing.assert_array_equal(found.t_us, night.t_us)
     np.testing.assert_array_equal(found.xy, night.xy)
     half = open_traverse(
-        file, windows=WindowSettings("1/15"), images=ImageSettings(width=40), size=(80, 60), time_unit="us"
+        file, recipe=Recipe(windows=WindowSettings("1/15")), width=40, size=(80, 60), time_unit="us"
     )
     assert half.images.shape == (30, 90, 40)
     assert half.track is None

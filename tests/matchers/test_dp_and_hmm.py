@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from evplace.core.errors import SettingsError
 from evplace.matchers import open_matcher
 from evplace.matchers._viterbi import Viterbi
-from evplace.matchers.hmm import Settings, log_odds, moving_mean, without_leading
+from evplace.matchers.hmm import HMM, log_odds, moving_mean, without_leading
 
 
 def plain_viterbi(gains, low, moves, jump) -> list[int]:
@@ -116,9 +116,9 @@ def test_hmm_is_told_of_another_speed() -> None:
 
 def test_hmm_takes_the_networks_probabilities() -> None:
     p = np.random.default_rng(0).dirichlet(np.full(30, 0.1), 50)
-    odds = log_odds(p, Settings(emission="probabilities"))
+    odds = log_odds(p, HMM(emission="probabilities"))
     np.testing.assert_allclose(odds, np.log(np.maximum(p, 1e-12) * 30), rtol=1e-5)
-    soft = log_odds(p, Settings(emission="softmax"))
+    soft = log_odds(p, HMM(emission="softmax"))
     np.testing.assert_allclose(np.exp(soft).mean(1), 1, rtol=1e-5)
 
 

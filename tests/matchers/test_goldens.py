@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from evplace.matchers import open_matcher
-from evplace.matchers.seqslam import Settings, offsets_of, sequence_scores
+from evplace.matchers.seqslam import SeqSLAM, offsets_of, sequence_scores
 from evplace.scorers._seqslam_images import normalise_patches
 
 TINY = dict(np.load(Path(__file__).parents[1] / "golden" / "tiny.npz"))
@@ -60,7 +60,7 @@ def assert_openseqslam2(differences: np.ndarray, answers: dict[str, np.ndarray])
     for key in (key for key in answers if key.endswith("__min_scores")):
         run = key.removesuffix("__min_scores")
         method, ds, low, high = re.fullmatch(r"(\w+)_ds(\d+)_v(\w+)_(\w+)", run).groups()
-        settings = Settings(
+        settings = SeqSLAM(
             ds=int(ds),
             v_min=float(low.replace("p", ".")),
             v_max=float(high.replace("p", ".")),

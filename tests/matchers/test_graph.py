@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from evplace.core.errors import ScoresError, SettingsError
 from evplace.matchers import Path, open_matcher
-from evplace.matchers._hashing import HashRelocaliser, bits
 
 
 class PlainGraph:
@@ -169,38 +168,14 @@ def test_finds_back_after_five_hidden_queries() -> None:
     assert (stuck.path().item[20:27] != at[20:27]).all()
 
 
-def test_hash_looks_only_at_what_it_is_offered() -> None:
-    rng = np.random.default_rng(1)
-    references = rng.normal(size=(50, 64))
-    queries = references[10:40] + rng.normal(size=(30, 64)) * 0.1
-    similarities = np.full((30, 50), 0.5)
-    graph = open_matcher("graph", relocalise="hash")
-    offered = HashRelocaliser(references, queries)
-    graph.relocaliser = offered
-    graph.extend(similarities)
-    assert graph.path().item[0] == 10
-    for q, row in enumerate(similarities):
-        assert 10 + q in offered(q, row)
-        assert len(offered(q, row)) < 20
-
-
-def test_hash_without_features_looks_at_the_highest_scores() -> None:
+def test_high_looks_at_the_highest_scores() -> None:
     similarities = np.random.default_rng(5).uniform(0.1, 1, (80, 40))
     paths: list[Path] = []
-    for way in ("hash", "all"):
+    for way in ("high", "all"):
         graph = open_matcher("graph", relocalise=way, m=1.3)
         graph.extend(similarities)
         paths.append(graph.path())
     np.testing.assert_array_equal(paths[0].item, paths[1].item)
-
-
-def test_bits_are_the_upper_half_of_a_vectors_range() -> None:
-    assert bits(np.array([[0.0, 0.49, 0.5, 1.0], [2, 2, 2, 2]])).tolist() == [
-        [False, False, True, True],
-        [False, False, False, False],
-    ]
-    with pytest.raises(ScoresError, match="alike"):
-        HashRelocaliser(np.zeros((3, 4)), np.zeros((3, 5)))
 
 
 @pytest.mark.parametrize(

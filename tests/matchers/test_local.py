@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from evplace.core.errors import SettingsError
 from evplace.matchers import Path, open_matcher
-from evplace.matchers.local import Settings, matcher
+from evplace.matchers.local import Local
 
 
-def algorithm_1(p: np.ndarray, s: Settings) -> list[int]:
+def algorithm_1(p: np.ndarray, s: Local) -> list[int]:
     """The paper's listing, line by line, with the readings of the settings."""
     match: list[int] = []
     centre = -1
@@ -33,7 +33,7 @@ def algorithm_1(p: np.ndarray, s: Settings) -> list[int]:
 
 
 SETTINGS = st.builds(
-    Settings,
+    Local,
     K=st.integers(1, 7),
     tau1=st.sampled_from([0.4, 0.7, 0.9]),
     tau2=st.sampled_from([0.1, 0.5]),
@@ -48,11 +48,11 @@ SETTINGS = st.builds(
 @given(SETTINGS, st.integers(1, 12), st.integers(0, 40), st.integers(0, 1000), st.integers(1, 9))
 def test_equals_the_listing_in_blocks_of_any_size(settings, items, queries, seed, block) -> None:
     p = np.random.default_rng(seed).integers(0, 11, (queries, items)) / 10
-    ours = matcher(settings)
+    ours = settings.start()
     for start in range(0, queries, block):
         ours.extend(p[start : start + block])
     assert ours.path().item.tolist() == algorithm_1(p, settings)
-    stepped = matcher(settings)
+    stepped = settings.start()
     steps = Path.of([stepped.step(row) for row in p])
     for one, other in zip(steps, ours.path(), strict=True):
         np.testing.assert_array_equal(one, other)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from evplace.core.errors import SettingsError
 from evplace.matchers import open_matcher
 from evplace.matchers._seqslam_search import enhance, trajectories
-from evplace.matchers.seqslam import Settings, offsets_of, sequence_scores
+from evplace.matchers.seqslam import SeqSLAM, offsets_of, sequence_scores
 
 
 def plain_contrast(distances: np.ndarray, R: int) -> np.ndarray:
@@ -26,7 +26,7 @@ def plain_contrast(distances: np.ndarray, R: int) -> np.ndarray:
     return contrast - contrast.min()
 
 
-def plain_scores(distances: np.ndarray, s: Settings) -> np.ndarray:
+def plain_scores(distances: np.ndarray, s: SeqSLAM) -> np.ndarray:
     """The three searches by their definitions."""
     contrast, nearest = plain_contrast(distances, s.R), distances.argmin(1)
     queries, items = distances.shape
@@ -61,7 +61,7 @@ def plain_scores(distances: np.ndarray, s: Settings) -> np.ndarray:
 )
 def test_equals_the_definition(search, ds, R, velocities, items, queries, seed) -> None:
     distances = np.random.default_rng(seed).integers(0, 200, (queries, items)).astype(np.float32)
-    s = Settings(ds=ds, R=R, v_min=velocities[0], v_max=velocities[1], search=search)
+    s = SeqSLAM(ds=ds, R=R, v_min=velocities[0], v_max=velocities[1], search=search)
     ours, plain = sequence_scores(-distances, s), plain_scores(distances, s) if queries else distances
     np.testing.assert_allclose(ours, plain, atol=2e-4)
 

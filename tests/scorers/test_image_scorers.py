@@ -7,11 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
-from evplace.scorers import seqslam
+from evplace.scorers import Rows, scorer_of
 from evplace.scorers._seqslam_images import prepare
-from evplace.scorers.cosine import CosineScorer
-from evplace.scorers.ncc import NccScorer, Settings, _reduction
-from evplace.scorers.sad import SadScorer
+from evplace.scorers.cosine import Cosine
+from evplace.scorers.ncc import NCC, _reduction
+from evplace.scorers.sad import SAD
+from evplace.scorers.seqslam import SeqSLAM
 
 Images = NDArray[np.uint8]
 
@@ -20,17 +21,21 @@ def images(n: int, shape: tuple[int, ...], seed: int = 0) -> Images:
     return np.random.default_rng(seed).integers(0, 256, (n, *shape), np.uint8)
 
 
+def rows_of(scorer: object, references: Images, queries: Images) -> Rows:
+    return scorer_of(scorer).open({"references": references}).rows(queries)
+
+
 @pytest.mark.parametrize("shape", [(9, 16), (9, 16, 3)])
 def test_sad_is_the_negated_mean_difference(shape: tuple[int, ...]) -> None:
     references, queries = images(6, shape), images(4, shape, seed=1)
     wanted = [[-np.abs(q.astype(int) - r).mean() for r in references] for q in queries]
-    np.testing.assert_allclose(SadScorer(references).rows(queries), wanted, rtol=1e-6)
+    np.testing.assert_allclose(rows_of(SAD(), references, queries), wanted, rtol=1e-6)
 
 
 @pytest.mark.parametrize("log", [False, True])
 def test_ncc_without_blur_or_reduction_is_pearsons_correlation(log: bool) -> None:
     references, queries = images(6, (7, 7)), images(4, (7, 7), seed=1)
-    rows = NccScorer(references, Settings(sigma=0, log=log)).rows(queries)
+    rows = rows_of(NCC(sigma=0, log=log), references, queries)
     flat = [block.reshape(len(block), -1).astype(float) for block in (queries, references)]
     a, b = (np.log1p(block) if log else block for block in flat)
     np.testing.assert_allclose(rows, np.corrcoef(a, b)[:4, 4:], atol=1e-5)
@@ -38,14 +43,13 @@ def test_ncc_without_blur_or_reduction_is_pearsons_correlation(log: bool) -> Non
 
 def test_ncc_ignores_brightness_and_contrast_and_finds_itself() -> None:
     references = images(6, (90, 160)) // 2
-    scorer = NccScorer(references, Settings())
-    rows = scorer.rows((references * 1.5 + 20).astype(np.uint8))
+    rows = rows_of(NCC(), references, (references * 1.5 + 20).astype(np.uint8))
     assert rows.argmax(axis=1).tolist() == list(range(6))
     np.testing.assert_allclose(np.diag(rows), 1, atol=1e-3)
 
 
 def test_ncc_of_an_image_without_contrast_is_nothing() -> None:
-    rows = NccScorer(images(3, (20, 30)), Settings()).rows(np.full((1, 20, 30), 7, np.uint8))
+    rows = rows_of(NCC(), images(3, (20, 30)), np.full((1, 20, 30), 7, np.uint8))
     assert (rows == 0).all()
 
 
@@ -58,7 +62,7 @@ def test_the_reduction_keeps_means() -> None:
 
 def test_settings_that_cannot_be_are_refused() -> None:
     with pytest.raises(SettingsError):
-        Settings(sigma=-1)
+        NCC(sigma=-1)
 
 
 @pytest.mark.parametrize("shape", [(9, 16), (9, 16, 3)])
@@ -66,16 +70,16 @@ def test_cosine_is_the_angle_between_pixels(shape: tuple[int, ...]) -> None:
     references, queries = images(6, shape), images(4, shape, seed=1)
     a, b = (block.reshape(len(block), -1).astype(float) for block in (queries, references))
     wanted = a @ b.T / np.outer(np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1))
-    np.testing.assert_allclose(CosineScorer(references).rows(queries), wanted, atol=1e-5)
-    assert (CosineScorer(references).rows(np.zeros((1, *shape), np.uint8)) == 0).all()
+    np.testing.assert_allclose(rows_of(Cosine(), references, queries), wanted, atol=1e-5)
+    assert (rows_of(Cosine(), references, np.zeros((1, *shape), np.uint8)) == 0).all()
 
 
 @pytest.mark.parametrize("patch", [0, 4])
 def test_seqslam_compares_prepared_images(patch: int) -> None:
     references, queries = images(5, (30, 40, 3)), images(3, (30, 40, 3), seed=1)
-    settings = seqslam.Settings(width=16, height=8, patch=patch)
+    settings = SeqSLAM(width=16, height=8, patch=patch)
     made = [[prepare(i, (16, 8), patch=patch or None).astype(int) for i in b] for b in (queries, references)]
     wanted = [[-np.abs(q - r).mean() for r in made[1]] for q in made[0]]
-    np.testing.assert_allclose(seqslam.SeqSLAMScorer(references, settings).rows(queries), wanted, rtol=1e-5)
+    np.testing.assert_allclose(rows_of(settings, references, queries), wanted, rtol=1e-5)
     with pytest.raises(SettingsError, match="patch of 0"):
-        seqslam.Settings(patch=1)
+        SeqSLAM(patch=1)

@@ -11,13 +11,13 @@ from evplace.core.errors import PlaceMapError
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
+from evplace.scorers.notebook import Notebook
 
 pytest.importorskip("torch", reason="the network needs the extra 'train'")
 
 
 def reading(place_map: PlaceMap, batch_statistics: bool, dropout: float) -> Localizer:
-    settings = {**place_map.settings, "scorer": {"batch_statistics": batch_statistics, "dropout": dropout}}
-    return Localizer(dataclasses.replace(place_map, scorer="notebook", settings=settings), "best")
+    return Localizer(dataclasses.replace(place_map, scorer=Notebook(batch_statistics, dropout)), "best")
 
 
 def test_with_neither_habit_it_is_the_network(network_map: PlaceMap, night: Traverse) -> None:
@@ -40,5 +40,5 @@ def test_dropout_stays_on_and_is_drawn_alike_each_time(network_map: PlaceMap, ni
 
 
 def test_a_map_of_images_has_no_network(image_map: PlaceMap) -> None:
-    with pytest.raises(PlaceMapError, match="no network"):
+    with pytest.raises(PlaceMapError, match=r"no weights\.safetensors"):
         reading(image_map, True, 0.5)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -22,21 +22,19 @@ from evplace.cli._track import TrackFlags
 from evplace.core import settings
 from evplace.core.errors import MissingExtraError, SettingsError
 from evplace.core.storage import check_new_folder
-from evplace.drives.to_traverse import open_traverse
 from evplace.evaluation import MARK
 from evplace.evaluation._evaluate import evaluate
 from evplace.evaluation.charts import curve_chart
 from evplace.evaluation.truth import Truth, by_frames, by_matrix
-from evplace.imaging.images import ImageSettings
 from evplace.imaging.traverse import Traverse
-from evplace.imaging.windows import WindowSettings
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 
+TIMINGS = {"live": "live answers", "hindsight": "answers in hindsight"}
 SHOWN = (
     "queries", "left_out", "accuracy", "accuracy_seen", "rejection_rate", "precision", "recall",
     "recall_accepted", "average_precision", "recall_at_full_precision", "recall@1", "recall@5", "recall@10",
-    "recall@20", "chance", "gallery_spacing_m",
+    "recall@20", "chance", "gallery_spacing_m", "delay_images",
 )  # fmt: skip
 
 
@@ -54,8 +52,13 @@ class Args(TrackFlags):
     """A .npy matrix of 0 and 1, rows = queries, columns = map items, in place of positions."""
     frames: int | None = None
     """Query and map are in step: how many items off an answer may be, in place of positions."""
-    rule: Literal["places", "view"] = "places"
-    """places: the paper's eight neighbours. view: also a reference within 20 m and 34 degrees."""
+    rule: Literal["places", "view", "radius"] = "places"
+    """places: the paper's eight neighbours. view: also a reference within 20 m and 34 degrees. radius: at
+    most --radius-m away, as is usual in the field."""
+    radius_m: float = 25.0
+    """For --rule radius: metres that an answer may be away."""
+    answers: Literal["live", "hindsight"] = "live"
+    """live: what the camera would have known as it drove. hindsight: what is known once it has arrived."""
     matcher: str = "local"
     """best (global-max), local (Algorithm 1), seqslam, graph, dp or hmm."""
     preset: str | None = None
@@ -88,16 +91,18 @@ def run(args: Args) -> int:
     place_map = PlaceMap.load(args.map)
     values = settings.from_pairs(args.set)
     where = Localizer(place_map, args.matcher, args.preset, args.mask, **values)
-    query = _opened(args, where)
+    query = _opened(args, place_map)
     reference = Traverse.load(args.reference) if args.reference is not None else None
-    result = evaluate(where, query, _truth(args, place_map, query), args.rule, reference)
+    truth = _truth(args, place_map, query)
+    result = evaluate(where, query, truth, args.rule, reference, args.answers, args.radius_m)
     result.save(args.out, args.overwrite, args.scores)
     with contextlib.suppress(MissingExtraError):  # a result is whole without its picture
         curve_chart(result.curve, args.out / "pr_curve.png")
     if args.json:
         print_json(result.figures)
     else:
-        print_facts(str(args.out), {name: result.figures[name] for name in SHOWN if name in result.figures})
+        shown = {name: result.figures[name] for name in SHOWN if result.figures.get(name) is not None}
+        print_facts(f"{args.out}: {TIMINGS[args.answers]}", shown)
     note_guesses(query.info.get("notes"))
     if query.info.get("fault"):
         note(f"{query.info['fault']}; what came before it was measured")
@@ -105,14 +110,10 @@ def run(args: Args) -> int:
     return 0
 
 
-def _opened(args: Args, where: Localizer) -> Traverse:
-    """The query, its images made as the map's were: of events, or the camera's own."""
-    windows = settings.make(WindowSettings, where.map.settings.get("windows") or {})
-    images = settings.make(ImageSettings, where.map.settings.get("images") or {})
-    return open_traverse(
-        args.drive, args.opened_track(), windows, images, args.size, args.time_unit, where.cleaning,
-        mask=where.mask, kind=where.map.settings.get("input"),
-    )  # fmt: skip
+def _opened(args: Args, place_map: PlaceMap) -> Traverse:
+    """The query, its images made as the map's were."""
+    size: dict[str, Any] = {} if args.size is None else {"size": args.size}
+    return place_map.open(args.drive, args.opened_track(), args.time_unit, args.mask, **size)
 
 
 def _truth(args: Args, place_map: PlaceMap, query: Traverse) -> Truth | None:

@@ -14,31 +14,23 @@ Examples:
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
+from evplace.cli._recipe import recipe_settings
 from evplace.cli._track import TrackFlags
-from evplace.core.errors import SettingsError
 from evplace.core.storage import check_new_file
-from evplace.drives.datasets import Drive
-from evplace.drives.to_traverse import is_kept, open_source, record
+from evplace.drives.to_traverse import open_source, record
 from evplace.imaging.images import ImageSettings
 from evplace.imaging.sheets import contact_sheet
 from evplace.imaging.spacing import SpacingSettings
 from evplace.imaging.traverse import Traverse, TraverseWriter, new_traverse
 from evplace.imaging.windows import WindowSettings
 from evplace.sources.cleaning import CleaningSettings
-
-OF_EVENTS = {"representation", "blur", "blur_last", "saturation", "tau_ms", "bins"}
-"""Settings of images that camera images do not take."""
-OF_FRAMES = {"tone"}
-"""Those that only camera images take."""
-S = TypeVar("S", WindowSettings, ImageSettings)
 
 
 @dataclass(frozen=True)
@@ -89,7 +81,7 @@ def run(args: Args) -> int:
         fault = _record(args, writer)
     traverse = Traverse.load(args.out)
     if args.sheet is not None:
-        are_events = traverse.info.get("input") == "events"
+        are_events = traverse.recipe is not None and traverse.recipe.kind == "events"
         contact_sheet(traverse.images, args.sheet, args.overwrite, events=are_events)
     placed = int(traverse.track.known.sum()) if traverse.track is not None else 0
     facts = {
@@ -117,35 +109,11 @@ def _record(args: Args, writer: TraverseWriter) -> str | None:
     """Write the images; returns what broke off, if anything."""
     fps = args.fps if "fps" in args.given else None
     drive = open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps)
-    _check_meant(args, drive)
-    windows, images = _over(drive.windows, args.windows, args), _over(drive.images, args.images, args)
     with remarks():
         return record(
-            drive,
-            writer,
-            args.opened_track(),
-            windows,
-            images,
-            args.cleaning,
-            args.spacing,
-            args.mask,
-            args.kind,
-        )
+            drive, writer, args.opened_track(), None, args.spacing, args.mask, **_named(args)
+        )  # fmt: skip
 
 
-def _check_meant(args: Args, drive: Drive) -> None:
-    """SettingsError where the user named a flag that means nothing for camera images, or for events."""
-    kept = is_kept(drive, args.kind)
-    windows = {field.name for field in dataclasses.fields(WindowSettings)}
-    idle = [name for name in args.given if name in (windows | OF_EVENTS if kept else OF_FRAMES)]
-    if idle:
-        flags = " and ".join(f"--{name.replace('_', '-')}" for name in dict.fromkeys(idle))
-        what, hint = ("camera images", ", or add --kind events") if kept else ("events", "")
-        raise SettingsError(f"{flags} means nothing for the {what} of {args.source}: leave it out{hint}")
-
-
-def _over(own: S, said: S, args: Args) -> S:
-    """The drive's own settings, with those on top that the user named."""
-    names = {field.name for field in dataclasses.fields(own)} & set(args.given)
-    values: dict[str, Any] = {name: getattr(said, name) for name in names}
-    return dataclasses.replace(own, **values)
+def _named(args: Args) -> dict[str, Any]:
+    return recipe_settings(args) | ({} if args.kind is None else {"kind": args.kind})

@@ -8,16 +8,15 @@ Examples:
 
 from __future__ import annotations
 
-import inspect
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import tyro
 
 from evplace.cli._output import print_facts, print_json
-from evplace.core import families as plugs
+from evplace.core import families
 
-Family = Literal["readers", "writers", "tracks", "datasets", "scorers", "matchers"]
+Family = Literal["readers", "writers", "tracks", "datasets", "representations", "scorers", "matchers"]
 
 
 @dataclass(frozen=True)
@@ -32,17 +31,20 @@ class Args:
 
 def run(args: Args) -> int:
     """Print the families and their parts, with the first lines of each part's description."""
-    families = get_args(Family) if args.family is None else (args.family,)
-    parts = {family: {name: _about(family, name) for name in plugs.names(family)} for family in families}
+    wanted = get_args(Family) if args.family is None else (args.family,)
+    parts = {family: {one.name: one for one in families.entries(family)} for family in wanted}
     if args.json:
-        print_json(parts)
+        print_json(
+            {family: {name: one._asdict() for name, one in found.items()} for family, found in parts.items()}
+        )
         return 0
-    for family, described in parts.items():
-        print_facts(family, described)
+    for family, found in parts.items():
+        print_facts(family, {name: _about(family, one) for name, one in found.items()})
     return 0
 
 
-def _about(family: str, name: str) -> str:
-    part = plugs.load(family, name)
-    about = (inspect.getdoc(part) or "").split("\n\n")[0].replace("\n", " ")
-    return f"{about} Needs {part.NEEDS}." if family == "datasets" else about
+def _about(family: str, one: families.Entry) -> str:
+    if one.fault is not None:
+        return one.fault
+    needs = f" Needs {families.load(family, one.name).NEEDS}." if family == "datasets" else ""
+    return f"{one.about}{needs}" + ("" if one.package == families.OURS else f" (from {one.package})")

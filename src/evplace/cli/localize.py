@@ -17,7 +17,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -25,11 +25,14 @@ from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.core import settings
 from evplace.core.errors import DamagedRecordingError
 from evplace.core.storage import new_file
-from evplace.imaging.traverse import Traverse
+from evplace.drives.to_traverse import open_source_for, recorded_as
+from evplace.imaging.traverse import MARK as TRAVERSE
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
 from evplace.sources.cleaning import pixel_mask
-from evplace.sources.readers import open_recording
+from evplace.sources.film import Film
+from evplace.sources.readers import Recording
+from evplace.sources.simulators.recording import SimulatedRecording
 
 COLUMNS = ("t_us", "place", "easting", "northing", "score", "state")
 
@@ -41,7 +44,7 @@ class Args:
     map: tyro.conf.Positional[Path]
     """A map that `evplace train` wrote."""
     drive: tyro.conf.Positional[Path]
-    """An event recording, or a traverse folder."""
+    """An event recording, a video, a folder of images, or a traverse folder."""
     matcher: str = "local"
     """best (global-max), local (Algorithm 1), seqslam, graph, dp or hmm."""
     preset: str | None = None
@@ -70,19 +73,38 @@ class _Drive:
         self.fault: str | None = None
 
     def __iter__(self) -> Iterator[Match]:
-        if (self._args.drive / "traverse.json").exists():
-            yield from self._where.match_traverse(Traverse.load(self._args.drive))
+        events = self._events()
+        if events is None:
+            query = self._where.map.open(
+                self._args.drive, None, self._args.time_unit, self._where.mask, **self._size()
+            )
+            self.fault = query.info.get("fault")
+            yield from self._where.match_traverse(query)
             return
-        recording = open_recording(self._args.drive, self._args.size, time_unit=self._args.time_unit)
-        note_guesses(recording.notes)
-        where = self._where
-        where.mask = pixel_mask(recording.packets(), recording.size, where.cleaning, where.mask)
+        note_guesses(events.notes)
         try:
-            for events in recording.packets():
-                yield from self._where.push(events)
+            for packet in events.packets():
+                yield from self._where.push(packet)
         except DamagedRecordingError as error:
             self.fault = str(error)
         yield from self._where.finish()
+
+    def _events(self) -> Recording | SimulatedRecording | None:
+        """What can be pushed packet by packet, its mask measured; None for images."""
+        recipe = self._where.map.recipe
+        if (self._args.drive / TRAVERSE).exists() or recipe is None:
+            return None
+        drive = open_source_for(self._args.drive, recipe, self._size(), self._args.time_unit, None, None)
+        source = recorded_as(recipe.kind, drive)
+        if isinstance(source, Film):
+            return None
+        given = self._where.mask if self._where.mask is not None else drive.mask
+        self._where.mask = pixel_mask(source.packets(), source.size, recipe.cleaning, given)
+        return source
+
+    def _size(self) -> dict[str, Any]:
+        """The size of the sensor, where it was given."""
+        return {} if self._args.size is None else {"size": self._args.size}
 
 
 def run(args: Args) -> int:

@@ -20,19 +20,21 @@ from typing import Annotated, Literal
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
+from evplace.cli._recipe import recipe_settings, spacing_given
 from evplace.cli._track import TrackFlags
+from evplace.core import families
 from evplace.core import settings as settings_room
-from evplace.core.errors import TraverseError
+from evplace.core.errors import SettingsError, TraverseError
 from evplace.core.storage import check_new_folder
 from evplace.drives.to_traverse import open_traverse
 from evplace.imaging.images import ImageSettings
 from evplace.imaging.spacing import SpacingSettings
 from evplace.imaging.traverse import Traverse
 from evplace.imaging.windows import WindowSettings
-from evplace.placemap import MARK
+from evplace.placemap import MARK, train
 from evplace.places import PlaceGrid, PlaceRuns, Places
-from evplace.scorers import checked_settings
-from evplace.scorers._network.training import PRESETS, TrainSettings, train
+from evplace.scorers import Descriptor, Learning, Scorer
+from evplace.scorers.network import TrainSettings
 from evplace.sources.cleaning import CleaningSettings
 
 
@@ -73,60 +75,64 @@ class Args(TrackFlags):
     """Replace what exists."""
     json: bool = False
     """Print one JSON object."""
+    given: Annotated[tuple[str, ...], tyro.conf.Suppress] = ()
 
 
 def run(args: Args) -> int:
     """Learn and save the map."""
     check_new_folder(args.out, args.overwrite, MARK)  # said before the training, not after it
-    scorer_settings = checked_settings(args.scorer, settings_room.from_pairs(args.set))
-    day = open_traverse(
-        args.drive, args.opened_track(), args.windows, args.images, args.size, args.time_unit,
-        args.cleaning, args.spacing, args.mask,
-    )  # fmt: skip
-    places = _places(args, day)
+    scorer = _scorer(args)
+    reference = open_traverse(
+        args.drive,
+        args.opened_track(),
+        None,
+        args.time_unit,
+        spacing_given(args),
+        args.mask,
+        **recipe_settings(args),
+    )
+    places = _places(args, reference)
     began = time.monotonic()
     with progress("training") as show:
-        learned = train(
-            day,
-            places,
-            args.scorer,
-            _train_settings(args),
-            progress=lambda step, steps, loss: show(step, steps, f"loss {loss:.3f}"),
-            checkpoint=args.out.with_name(f".{args.out.name}.checkpoint"),
-            scorer_settings=scorer_settings,
+        learning = Learning(
+            lambda step, steps, loss: show(step, steps, f"loss {loss:.3f}"),
+            args.out.with_name(f".{args.out.name}.checkpoint"),
         )
+        learned = train(reference, places, scorer, learning=learning)
     seconds = time.monotonic() - began
     learned.save(args.out, args.overwrite)
     facts = {
-        "scorer": learned.scorer,
-        "images": len(day),
+        "scorer": families.name_of("scorers", learned.scorer),
+        "images": len(reference),
         "places": places.n,
         "items": len(learned.items),
         "seconds": round(seconds, 1),
     }
     print_json(facts) if args.json else print_facts(str(args.out), facts)
-    note_guesses(day.info.get("notes"))
-    if day.info.get("fault"):
-        note(f"{day.info['fault']}; what came before it was learned")
+    note_guesses(reference.info.get("notes"))
+    if reference.info.get("fault"):
+        note(f"{reference.info['fault']}; what came before it was learned")
         return USED_GOOD_PART
     return 0
 
 
-def _places(args: Args, day: Traverse) -> Places:
+def _places(args: Args, reference: Traverse) -> Places:
     if args.run_length:
-        return PlaceRuns(len(day), args.run_length, args.tolerance)
-    if day.track is None:
+        return PlaceRuns(len(reference), args.run_length, args.tolerance)
+    if reference.track is None:
         raise TraverseError(
             f"{args.drive} has no positions: add --track with its GPS log, or --run-length for places "
             "that are stretches of images"
         )
-    return PlaceGrid.from_track(day.track, args.cell_m)
+    return PlaceGrid.from_track(reference.track, args.cell_m)
 
 
-def _train_settings(args: Args) -> TrainSettings:
-    """The preset's settings, under those flags that differ from the defaults."""
-    if args.preset is None:
-        return args.train
-    plain, given = settings_room.to_dict(TrainSettings()), settings_room.to_dict(args.train)
-    changed = {name: value for name, value in given.items() if value != plain[name]}
-    return settings_room.make(TrainSettings, changed, PRESETS[args.preset])
+def _scorer(args: Args) -> Scorer | Descriptor:
+    """The scorer with its settings: for one that is trained by these flags, those of the training."""
+    values = settings_room.from_pairs(args.set)
+    trained = {name: getattr(args.train, name) for name in vars(args.train) if name in args.given}
+    if args.scorer != "network" and trained:
+        flag = next(iter(trained)).replace("_", "-")
+        raise SettingsError(f"--{flag} means nothing for the scorer '{args.scorer}': leave it out")
+    part: Scorer | Descriptor = families.make("scorers", args.scorer, args.preset, {**trained, **values})
+    return part

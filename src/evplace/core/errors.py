@@ -2,6 +2,7 @@
 
 EvplaceError
 ├── SettingsError            a setting is unknown or has a value that cannot be used
+├── PartError                another package's part cannot be loaded, or breaks what its family promises
 ├── MissingExtraError        an optional dependency is needed: the text carries the pip line
 ├── InputError               what was given cannot be used
 │   ├── RecordingError       an event recording
@@ -27,6 +28,10 @@ class EvplaceError(Exception):
 
 class SettingsError(EvplaceError):
     """A setting is unknown or has a value that cannot be used."""
+
+
+class PartError(EvplaceError):
+    """Another package's part cannot be loaded, or breaks what its family promises."""
 
 
 class MissingExtraError(EvplaceError):

@@ -1,40 +1,204 @@
-"""Families of interchangeable parts: a folder is a family, a file in it is one part, its name is its name.
+"""Families of interchangeable parts: readers, tracks, scorers, matchers and so on.
 
-Adding a part touches its own file and its test, nothing else: the folder itself is the list.
+A family is a folder; a file in it is one part, and its name is the part's name. Other packages add parts by
+entry points in the group `evplace.FAMILY`. No list anywhere names the parts. In some families a part is a
+module of functions (a reader); in the others it is a class, a frozen dataclass of settings, found in its file
+as the class with the file's name (`Local` in `local.py`).
 """
 
 from __future__ import annotations
 
 import functools
 import importlib
+import inspect
 import pkgutil
-from types import ModuleType
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, NamedTuple
 
-from evplace.core.errors import SettingsError
+from evplace.core import settings
+from evplace.core.errors import EvplaceError, PartError, SettingsError
+
+MODULES = {
+    "readers": "evplace.sources.readers",
+    "writers": "evplace.sources.writers",
+    "tracks": "evplace.sources.tracks",
+    "datasets": "evplace.drives.datasets",
+    "doctor": "evplace.doctor",
+    "reproduction": "evplace_lab.reproduction",
+}
+"""Family -> folder, where a part is a module."""
+CLASSES = {
+    "representations": "evplace.imaging.representations",
+    "scorers": "evplace.scorers",
+    "matchers": "evplace.matchers",
+}
+"""Family -> folder, where a part is a class."""
+OURS = "evplace"
+
+
+class Entry(NamedTuple):
+    """A part as a list shows it."""
+
+    name: str
+    package: str
+    """The package that it comes from."""
+    about: str
+    """The first paragraph of its description."""
+    fault: str | None = None
+    """Why it cannot be used."""
 
 
 def names(family: str) -> list[str]:
-    """The parts of a family, for example `names("matchers")`: the public files of its folder, sorted."""
-    return list(_names(family))
+    """The parts of a family, for example `names("matchers")`, sorted; our own and those of other packages."""
+    return sorted({*_own(family), *_others(family)})
+
+
+def load(family: str, name: str) -> Any:
+    """The part `name` of a family: a module, or a class.
+
+    SettingsError, with the known names, where there is none; PartError where another package's part cannot
+    be loaded.
+    """
+    if name in _own(family):
+        module = importlib.import_module(f"{_folder(family)}.{name.replace('-', '_')}")
+        return module if family in MODULES else _class_of(module, name)
+    if name in _others(family):
+        return _load_other(family, _others(family)[name])
+    raise SettingsError(f"'{name}' is none of the {family}: known are {', '.join(names(family))}")
+
+
+def class_called(family: str, name: str) -> Any:
+    """Our own class of that name, such as "Local" of the matchers; AttributeError where there is none."""
+    for own in _own(family):
+        if own.replace("-", "") == name.lower() and load(family, own).__name__ == name:
+            return load(family, own)
+    raise AttributeError(f"module '{_folder(family)}' has no attribute '{name}'")
+
+
+def loadable(family: str) -> Iterator[tuple[str, Any]]:
+    """Name and part of all that can be loaded: one that cannot does not stop the others."""
+    for name in names(family):
+        try:
+            yield name, load(family, name)
+        except PartError:
+            continue
+
+
+def make(family: str, given: object, preset: str | None = None, values: Mapping[str, object] = {}) -> Any:
+    """The part that is `given` by name, with `values` over the settings of its `preset`; or an object itself.
+
+    SettingsError for an unknown name, preset or setting, and where an object comes with settings beside it.
+    """
+    if not isinstance(given, str):
+        if preset is not None or values:
+            raise SettingsError(
+                f"settings beside the object {given!r}: put them into the object, or give its name"
+            )
+        return given
+    kind = load(family, given)
+    base = None
+    if preset is not None:
+        presets: Mapping[str, object] = getattr(kind, "presets", {})
+        if preset not in presets:
+            known = ", ".join(sorted(presets)) or "none"
+            raise SettingsError(
+                f"the {family.removesuffix('s')} '{given}' has no preset '{preset}': known are {known}"
+            )
+        base = presets[preset]
+    return settings.make(kind, values, base)
+
+
+def name_of(family: str, part: object) -> str:
+    """The name of an object's class in its family; the class's own name where it is in none."""
+    kind = type(part)
+    folder, _, file = kind.__module__.rpartition(".")
+    if folder == _folder(family):
+        return file.replace("_", "-")
+    for name, entry in _others(family).items():
+        if entry.value == f"{kind.__module__}:{kind.__qualname__}":
+            return name
+    return kind.__qualname__
+
+
+def package_of(part: object) -> str:
+    """The package that an object's class, a class, or a module comes from."""
+    module = part.__name__ if inspect.ismodule(part) else getattr(part, "__module__", type(part).__module__)
+    return str(module).partition(".")[0]
+
+
+def entries(family: str) -> list[Entry]:
+    """All parts of a family as a list shows them, with those that cannot be loaded and why."""
+    return [_entry(family, name) for name in names(family)]
+
+
+@contextmanager
+def blaming(family: str, part: object) -> Iterator[None]:
+    """Whatever another package's part raises within the block becomes one PartError that names it."""
+    try:
+        yield
+    except EvplaceError:
+        raise
+    except Exception as error:
+        if package_of(part).startswith(OURS):
+            raise
+        raise PartError(f"{described(family, part)} failed: {type(error).__name__}: {error}") from error
+
+
+def described(family: str, part: object) -> str:
+    """How a message names a part: what it is, its name, and the package where this is not ours."""
+    package = package_of(part)
+    origin = "" if package.startswith(OURS) else f" of the package {package}"
+    return f"the {family.removesuffix('s')} '{name_of(family, part)}'{origin}"
+
+
+def _folder(family: str) -> str:
+    return MODULES.get(family) or CLASSES[family]
 
 
 @functools.cache
-def _names(family: str) -> tuple[str, ...]:
-    """Looked up once: telling a recording's format asks for every reader, and a folder is slow to list."""
-    package = importlib.import_module(_package(family))
+def _own(family: str) -> tuple[str, ...]:
+    """Looked up once: recognising a format asks for every reader, and a folder is slow to list."""
+    package = importlib.import_module(_folder(family))
     found = (module.name for module in pkgutil.iter_modules(package.__path__))
-    return tuple(sorted(name for name in found if not name.startswith("_")))
+    public = (name for name in found if not name.startswith("_"))
+    return tuple(sorted(name.replace("_", "-") if family in CLASSES else name for name in public))
 
 
-def load(family: str, name: str) -> ModuleType:
-    """The part `name` of a family; SettingsError, with the known names, where there is none."""
-    known = names(family)
-    if name not in known:
-        raise SettingsError(f"'{name}' is none of the {family}: known are {', '.join(known)}")
-    return importlib.import_module(f"{_package(family)}.{name}")
+@functools.cache
+def _others(family: str) -> dict[str, EntryPoint]:
+    """Parts of other packages; a name of our own is ours."""
+    found = entry_points(group=f"evplace.{family}")
+    return {entry.name: entry for entry in found if entry.name not in _own(family)}
 
 
-def _package(family: str) -> str:
-    """Where the files of a family lie."""
-    group = {"readers": "sources.", "writers": "sources.", "tracks": "sources.", "datasets": "drives."}
-    return f"evplace.{group.get(family, '')}{family}"
+def _class_of(module: Any, name: str) -> Any:
+    wanted = name.replace("-", "")
+    return next(kind for key, kind in vars(module).items() if key.lower() == wanted and inspect.isclass(kind))
+
+
+def _load_other(family: str, entry: EntryPoint) -> Any:
+    try:
+        return entry.load()
+    except Exception as error:  # whatever another package's import may raise
+        raise PartError(
+            f"the {family.removesuffix('s')} '{entry.name}' of the package {_distribution(entry)} cannot be "
+            f"loaded: {type(error).__name__}: {error}"
+        ) from error
+
+
+def _distribution(entry: EntryPoint) -> str:
+    return entry.dist.name if entry.dist is not None else entry.module.partition(".")[0]
+
+
+def _entry(family: str, name: str) -> Entry:
+    other = _others(family).get(name)
+    package = OURS if other is None else _distribution(other)
+    try:
+        part = load(family, name)
+    except PartError as error:
+        return Entry(name, package, "", str(error))
+    # A class's own description is of its settings; that of its file says what the part is.
+    about = inspect.getmodule(part) if family in CLASSES and other is None else part
+    return Entry(name, package, (inspect.getdoc(about) or "").split("\n\n")[0].replace("\n", " "))

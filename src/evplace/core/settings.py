@@ -82,6 +82,8 @@ def _as(hint: Any, value: object, key: str) -> object:
     options = getattr(hint, "__args__", ()) if not isinstance(hint, type) else ()
     origin = getattr(hint, "__origin__", None)
     _check_number(key, value)
+    if dataclasses.is_dataclass(hint) and isinstance(value, Mapping):
+        return make(hint, value)  # type: ignore[arg-type]  # a dataclass is a type
     if origin is tuple and isinstance(value, list | tuple):
         return tuple(value)
     if isinstance(value, Mapping) and dict in (

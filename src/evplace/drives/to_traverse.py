@@ -6,12 +6,11 @@ import dataclasses
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Generic, Literal, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core import settings as settings_room
 from evplace.core.errors import (
     DamagedRecordingError,
     RecordingError,
@@ -20,13 +19,14 @@ from evplace.core.errors import (
     TraverseError,
 )
 from evplace.core.events import Size
+from evplace.core.settings import make, to_dict
 from evplace.drives import datasets
 from evplace.drives.datasets import Drive
-from evplace.imaging.images import ImageSettings, frame_image
+from evplace.imaging.images import frame_image
+from evplace.imaging.recipe import OF_EVENTS, Kind, Recipe, shown
 from evplace.imaging.spacing import Spacer, SpacingSettings
 from evplace.imaging.stream import EventImages, images_of
-from evplace.imaging.traverse import Traverse, TraverseWriter
-from evplace.imaging.windows import WindowSettings
+from evplace.imaging.traverse import MARK, Traverse, TraverseWriter
 from evplace.sources.cleaning import CleaningSettings, MaskSource, pixel_mask
 from evplace.sources.film import VIDEOS, Film, film_of, is_video, open_film
 from evplace.sources.frames import is_frames, open_frames
@@ -35,47 +35,41 @@ from evplace.sources.simulators.recording import SimulatedRecording
 from evplace.sources.tracks import Track, open_track
 
 T = TypeVar("T")
-Kind = Literal["events", "frames"]
-"""Event images, simulated where there are no events; or the camera's own images."""
 
 
 def open_traverse(
     path: str | Path,
     track: str | Path | Track | None = None,
-    windows: WindowSettings | None = None,
-    images: ImageSettings | None = None,
-    size: Size | None = None,
+    recipe: Recipe | None = None,
     time_unit: str | None = None,
-    cleaning: CleaningSettings | None = None,
     spacing: SpacingSettings | None = None,
     mask: MaskSource | None = None,
     drive: str | None = None,
     dataset: str | None = None,
-    kind: Kind | None = None,
+    **settings: object,
 ) -> Traverse:
     """A traverse folder, an event recording, a video, a folder of images or a data set, as `path` is.
 
-    `drive` names a drive of a data set, which is recognised by its layout or named by `dataset`; it brings
-    its own track, mask and settings, unless others are given. `kind` is "events" (simulated where there are
-    only images: the default for videos and for data sets of films) or "frames" (the camera's own images, in
-    colour where they have colours).
+    `recipe` says how its images are made, and `settings` are single ones over it: `dt="1/60"`, `size=(640,
+    480)` for a recording that does not say, `kind="frames"` for a camera's own images in place of simulated
+    events (which is what videos and data sets of films become otherwise). Without a recipe it is the source's
+    own. `drive` names a drive of a data set, which is recognised by its layout or named by `dataset`; it
+    brings its own track, mask and recipe, unless others are given.
 
     Recordings and images are turned into images in memory; for long ones, write a traverse folder with
-    `evplace images` first. `track` is a GPS log, or a Track; `size` and `time_unit` are
-    for recordings that do not say (see `open_recording`). `mask` names pixels of the recording to leave out
-    (see `evplace.sources.cleaning.read_mask`), besides what `cleaning` says. InputError where something
-    cannot be read, or where a traverse folder was cleaned or spaced in another way than is asked for.
+    `evplace images` first. `track` is a GPS log, or a Track; `time_unit` is for recordings that do not say
+    (see `open_recording`). `mask` names pixels of the recording to leave out (see
+    `evplace.sources.cleaning.read_mask`), besides what the recipe says. InputError where something cannot be
+    read, or where a traverse folder was made otherwise than is asked for.
     """
-    if (Path(path) / "traverse.json").exists():
-        found = Traverse.load(path)
-        _check_made_so(Path(path), found, cleaning, spacing, mask)
-        aligned = _aligned(_opened(track), found.t_us)
-        return found if aligned is None else dataclasses.replace(found, track=aligned)
+    if (Path(path) / MARK).exists():
+        asked = {"time_unit": time_unit, "spacing": spacing, "mask": mask, "drive": drive, "dataset": dataset}
+        return _opened_again(Path(path), _opened(track), recipe, settings, asked)
+    source = open_source_for(path, recipe, settings, time_unit, drive, dataset)
     with tempfile.TemporaryDirectory(prefix="evplace-") as folder:
         writer = TraverseWriter(Path(folder), {})
         try:
-            source = open_source(path, size, time_unit, drive, dataset)
-            record(source, writer, track, windows, images, cleaning, spacing, mask, kind)
+            record(source, writer, track, recipe, spacing, mask, **settings)
             writer.close()
         finally:
             writer.discard()
@@ -120,103 +114,174 @@ def record(
     drive: Drive,
     writer: TraverseWriter,
     track: str | Path | Track | None = None,
-    windows: WindowSettings | None = None,
-    images: ImageSettings | None = None,
-    cleaning: CleaningSettings | None = None,
+    recipe: Recipe | None = None,
     spacing: SpacingSettings | None = None,
     mask: MaskSource | None = None,
-    kind: Kind | None = None,
+    **settings: object,
 ) -> str | None:
-    """Write the images of a drive; what is not given is the drive's own. Returns what broke off, if any."""
+    """Write the images of a drive; what is not given is the drive's own. Returns what broke off, if any.
+
+    `recipe` and `settings` as in `open_traverse`. SettingsError where `settings` name what means nothing for
+    the drive; TraverseError where the recipe is of another sensor.
+    """
+    asked = (recipe or drive.recipe).changed(**settings)
+    source = recorded_as(asked.kind, drive)
+    _check_meant(source, settings)
     positions = drive.track if track is None else _opened(track)
-    windows, images = windows or drive.windows, images or drive.images
     mask = drive.mask if mask is None else mask
-    source = _as(kind, drive)
     if isinstance(source, Film):
-        check_uncleaned(source.path, cleaning, mask)
-        return record_frames(source, writer, images, positions, spacing)
-    return record_events(source, writer, windows, images, positions, cleaning, spacing, mask)
+        check_uncleaned(source.path, asked, mask)
+        return _record_frames(source, writer, asked, positions, spacing)
+    return _record_events(source, writer, asked, positions, spacing, mask)
 
 
-def record_events(
+def _record_events(
     recording: Recording | SimulatedRecording,
     writer: TraverseWriter,
-    windows: WindowSettings | None = None,
-    images: ImageSettings | None = None,
-    track: Track | None = None,
-    cleaning: CleaningSettings | None = None,
-    spacing: SpacingSettings | None = None,
-    mask: MaskSource | None = None,
+    asked: Recipe,
+    track: Track | None,
+    spacing: SpacingSettings | None,
+    mask: MaskSource | None,
 ) -> str | None:
     """Write a recording's event images; returns what broke off, where the recording is damaged."""
-    windows, images = windows or WindowSettings(), images or ImageSettings()
-    cleaning, spacer = cleaning or CleaningSettings(), Spacer(spacing, track)
-    writer.mask = pixel_mask(recording.packets(), recording.size, cleaning, mask)
-    stream = EventImages(recording.size, windows, images, cleaning, writer.mask)
+    recipe = dataclasses.replace(asked, kind="events", size=recording.size)
+    recipe.require_same(asked, str(recording.path), "the images asked for", "they cannot be made of it")
+    spacer = Spacer(spacing, track)
+    writer.recipe = recipe
+    writer.mask = pixel_mask(recording.packets(), recording.size, recipe.cleaning, mask)
+    stream = EventImages(recording.size, recipe, writer.mask)
     packets = _GoodPart(recording.packets())
     overlap = _Overlap(track)
     for image, window in images_of(packets, stream):
         overlap.see(window.t_us)
         if spacer.keeps(window.t_us, window.events):
             writer.add(image, window.t_us, window.events)
-    fault = packets.fault
     overlap.check()
     writer.track = _aligned(track, np.array(writer.t_us, np.int64))
     writer.info |= {
         "source": str(recording.path),
-        "input": "events",
-        "sensor": list(recording.size),
-        "windows": settings_room.to_dict(windows),
-        "images": settings_room.to_dict(images),
-        "cleaning": settings_room.to_dict(cleaning),
-        "spacing": settings_room.to_dict(spacer.settings),
+        "spacing": to_dict(spacer.settings),
         "notes": recording.notes,
         "dropped": recording.dropped,
         "cleaned": stream.cleaned,
         "left_out": spacer.left_out,
-        "fault": fault,
+        "fault": packets.fault,
     }
     if isinstance(recording, SimulatedRecording):
-        writer.info["simulated"] = settings_room.to_dict(recording.sensor) | {"seed": recording.seed}
-    return fault
+        writer.info["simulated"] = to_dict(recording.sensor) | {"seed": recording.seed}
+    return packets.fault
 
 
-def record_frames(
-    film: Film,
-    writer: TraverseWriter,
-    images: ImageSettings | None = None,
-    track: Track | None = None,
-    spacing: SpacingSettings | None = None,
+def _record_frames(
+    film: Film, writer: TraverseWriter, asked: Recipe, track: Track | None, spacing: SpacingSettings | None
 ) -> str | None:
-    """Write camera images, cropped and resized as `images` says; returns what broke off, as above."""
-    images, spacer = images or ImageSettings(), Spacer(spacing, track)
+    """Write camera images, cropped and resized as the recipe says; returns what broke off, as above."""
     shape, frames, overlap = None, _GoodPart(film.images()), _Overlap(track)
+    spacer = Spacer(spacing, track)
     for n, (t_us, frame) in enumerate(frames):
-        shape = shape or frame.shape
+        if shape is None:
+            shape = frame.shape
+            writer.recipe = dataclasses.replace(asked, kind="frames", size=(shape[1], shape[0]))
+            writer.recipe.require_same(
+                asked, str(film.path), "the images asked for", "they cannot be made of it"
+            )
         if frame.shape != shape:
             raise TraverseError(
                 f"{film.name(n)} is {frame.shape}, the images before it are {shape}: make them alike"
             )
         overlap.see(t_us)
         if spacer.keeps(t_us, -1):
-            writer.add(frame_image(frame, images), t_us)
+            writer.add(frame_image(frame, asked.images), t_us)
     overlap.check()
     writer.track = _aligned(track, np.array(writer.t_us, np.int64))
     writer.info |= {
         "source": str(film.path),
-        "input": "frames",
         "timed": film.timed,
-        "images": settings_room.to_dict(images),
-        "spacing": settings_room.to_dict(spacer.settings),
+        "spacing": to_dict(spacer.settings),
         "left_out": spacer.left_out,
         "fault": frames.fault,
     }
     return frames.fault
 
 
+def open_source_for(
+    path: str | Path,
+    recipe: Recipe | None,
+    settings: Mapping[str, Any],
+    time_unit: str | None,
+    drive: str | None,
+    dataset: str | None,
+) -> Drive:
+    """What `path` holds; a recording that does not state its sensor's size has that of the recipe."""
+    opened = open_source(path, settings.get("size"), time_unit, drive, dataset)
+    source = opened.source
+    if recipe is None or recipe.size is None or "size" in settings:
+        return opened
+    if not isinstance(source, Recording) or source.states_size:
+        return opened
+    return dataclasses.replace(opened, source=_recording(source.path, recipe.size, time_unit))
+
+
+def _opened_again(
+    path: Path,
+    track: Track | None,
+    recipe: Recipe | None,
+    settings: Mapping[str, Any],
+    asked: Mapping[str, object],
+) -> Traverse:
+    """A traverse folder; TraverseError where its images were made otherwise than is asked for."""
+    found = Traverse.load(path)
+    again = "make it again from the recording with `evplace images`"
+    if asked["spacing"] is not None:
+        asked = {**asked, "spacing": _other_spacing(found, asked["spacing"])}
+    given = [name for name, value in asked.items() if value is not None]
+    if given:
+        raise TraverseError(
+            f"the images in {path} are made already: '{given[0]}' cannot change them, leave it out or {again}"
+        )
+    if recipe is not None and found.recipe is not None:
+        found.recipe.require_same(recipe, f"the traverse {path}", "the recipe asked for", again)
+    if settings:
+        _check_made_so(path, found.recipe, settings, again)
+    aligned = _aligned(track, found.t_us)
+    return found if aligned is None else dataclasses.replace(found, track=aligned)
+
+
+def _other_spacing(found: Traverse, asked: object) -> object:
+    """The spacing that is asked for, where the traverse has another; None where it has this one."""
+    made = make(SpacingSettings, found.info.get("spacing") or {})
+    return None if asked in (made, SpacingSettings()) else asked
+
+
+def _check_made_so(path: Path, made: Recipe | None, settings: Mapping[str, Any], again: str) -> None:
+    """TraverseError where images that are made already have another value of a setting."""
+    if made is None:
+        raise TraverseError(
+            f"how the images in {path} were made is not known: leave out '{next(iter(settings))}'"
+        )
+    apart = made.changed(**settings).differences(made)
+    for name, (wanted, value) in apart.items():
+        raise TraverseError(
+            f"the images in {path} were made with {name} {shown(value)}, not {shown(wanted)}: {again}"
+        )
+    _check_kind(made.kind, str(path), settings)
+
+
 def is_kept(drive: Drive, kind: Kind | None = None) -> bool:
     """Whether camera images are kept as they are, so that settings of events mean nothing."""
-    return isinstance(_as(kind, drive), Film)
+    return isinstance(recorded_as(kind, drive), Film)
+
+
+def _check_meant(source: Recording | SimulatedRecording | Film, settings: Mapping[str, Any]) -> None:
+    _check_kind("frames" if isinstance(source, Film) else "events", str(source.path), settings)
+
+
+def _check_kind(kind: Kind | None, path: str, settings: Mapping[str, Any]) -> None:
+    """SettingsError where a setting is named that means nothing for camera images, or for events."""
+    idle = [name for name in settings if name in (OF_EVENTS if kind == "frames" else ("tone",))]
+    if idle:
+        what, hint = ("camera images", ", or take kind 'events'") if kind == "frames" else ("events", "")
+        raise SettingsError(f"'{idle[0]}' means nothing for the {what} of {path}: leave it out{hint}")
 
 
 def _refuse(what: str, flags: Mapping[str, object]) -> None:
@@ -242,35 +307,13 @@ def _recording(place: Path, size: Size | None, time_unit: str | None) -> Recordi
         raise RecordingError(f"{error}; videos are {', '.join(VIDEOS)}") from error
 
 
-def _check_made_so(
-    path: Path,
-    found: Traverse,
-    cleaning: CleaningSettings | None,
-    spacing: SpacingSettings | None,
-    mask: MaskSource | None,
-) -> None:
-    """TraverseError where images that are made already were to be cleaned or spaced in another way."""
-    asked = {"cleaning": cleaning or CleaningSettings(), "spacing": spacing or SpacingSettings()}
-    for name, settings in asked.items():
-        made = settings_room.make(type(settings), found.info.get(name) or {})
-        if settings not in (made, type(settings)()):
-            raise TraverseError(
-                f"the images in {path} were made with {name} {settings_room.to_dict(made)}, not "
-                f"{settings_room.to_dict(settings)}: make them again from the recording with `evplace images`"
-            )
-    if mask is not None:
-        raise TraverseError(
-            f"the images in {path} are made already: give the mask to `evplace images` with the recording"
-        )
-
-
-def check_uncleaned(path: str | Path, cleaning: CleaningSettings | None, mask: MaskSource | None) -> None:
+def check_uncleaned(path: str | Path, recipe: Recipe, mask: MaskSource | None) -> None:
     """TraverseError where camera images were to be cleaned."""
-    if mask is not None or cleaning not in (None, CleaningSettings()):
+    if mask is not None or recipe.cleaning != CleaningSettings():
         raise TraverseError(f"{path} holds camera images, which have no events to clean: leave that out")
 
 
-def _as(kind: Kind | None, drive: Drive) -> Recording | SimulatedRecording | Film:
+def recorded_as(kind: Kind | None, drive: Drive) -> Recording | SimulatedRecording | Film:
     """What is recorded of a drive: its events, simulated ones, or its images."""
     if isinstance(drive.source, Recording):
         if kind == "frames":

@@ -64,13 +64,14 @@ def measure(
     t_us: ArrayLike | None = None,
     settings: Mapping[str, Any] | None = None,
     query_xy: ArrayLike | None = None,
+    delay: int | None = None,
 ) -> Result:
     """The figures of a matcher's `answers` (queries) by `truth`.
 
     `scores` (queries, items) adds recall@N; `positions` (items, 2) in metres adds the gallery spacing;
-    `t_us` (queries,), `settings` and the positions, also `query_xy` (queries, 2), are kept with the
-    result. Queries that the truth knows nothing of are left out and counted. Raises EvaluationError where
-    the parts do not fit or no query is judged.
+    `t_us` (queries,), `settings` and the positions, also `query_xy` (queries, 2), are kept with the result;
+    so is `delay`, how many images later an answer was known at most. Queries that the truth knows nothing of
+    are left out and counted. Raises EvaluationError where the parts do not fit or no query is judged.
     """
     _check(answers, truth, scores)
     here, there = _known(query_xy, truth.n_queries), _known(positions, truth.n_items)
@@ -86,6 +87,7 @@ def measure(
         | _measures.chance(shares[judged], seen[judged])
         | (_measures.recalls(ranked[judged], seen[judged]) if ranked is not None else {})
         | {"gallery_spacing_m": None if positions is None else gallery_spacing(positions)}
+        | {"delay_images": delay}
     )
     times = np.full(len(judged), -1) if t_us is None else np.asarray(t_us, np.int64)
     resolved = dict(settings or {}) | {"truth": truth.rule}
@@ -104,7 +106,7 @@ def sample(result: Result, images: NDArray[np.uint8], of_items: ItemImages) -> R
 
 
 def compare(results: Iterable[Result | str | Path]) -> list[dict[str, Any]]:
-    """One row a result: its name, its figures, and those settings in which the results differ.
+    """One row a result: its name, whether its answers are live, its figures, and settings that differ.
 
     Folders are read, nothing is run again. Nested settings are named as in `truth.cell_m`.
     """
@@ -113,7 +115,9 @@ def compare(results: Iterable[Result | str | Path]) -> list[dict[str, Any]]:
     keys = list(dict.fromkeys(key for one in settings for key in one))
     differing = [key for key in keys if any(one.get(key) != settings[0].get(key) for one in settings)]
     return [
-        {"result": name} | _flat(result.figures) | {key: one.get(key) for key in differing}
+        {"result": name, "answers": result.timing}
+        | _flat(result.figures)
+        | {key: one.get(key) for key in differing}
         for (name, result), one in zip(named, settings, strict=True)
     ]
 

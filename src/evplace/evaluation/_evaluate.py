@@ -1,4 +1,4 @@
-"""A trial: one localizer on one query traverse, judged by where the query really was."""
+"""One localizer on one query traverse, judged by where the query really was."""
 
 from __future__ import annotations
 
@@ -11,50 +11,61 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import EvaluationError
 from evplace.evaluation import ItemImages, Result, measure, sample
-from evplace.evaluation.truth import Truth, by_cells, by_places, only_views
+from evplace.evaluation.truth import Truth, by_cells, by_places, by_radius, only_views
 from evplace.imaging.traverse import Traverse
-from evplace.localizer import Localizer
+from evplace.localizer import Answers, Localizer
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns
 from evplace.sources.tracks import Track
 
-Rule = Literal["places", "view"]
+Rule = Literal["places", "view", "radius"]
 MARGIN_M = 1000.0
 """A query further than this from all of the map's ground is taken for a mistake."""
+RADIUS_M = 25.0
+"""The field's usual radius."""
 
 
 def evaluate(
-    where: Localizer,
+    localizer: Localizer,
     query: Traverse,
     truth: Truth | None = None,
     rule: Rule = "places",
     reference: Traverse | None = None,
+    answers: Answers = "live",
+    radius_m: float = RADIUS_M,
 ) -> Result:
-    """Localise the whole `query` and measure the answers.
+    """Localise the whole `query` and measure the answers: "live" ones, or those of "hindsight".
 
     Without `truth`, the positions are: by `rule` places, an answer is right in the query's cell or one of its
     eight neighbours (paper, section 3.4), and a query is seen where the map has any such cell. By view it is
-    seen only where the map holds a reference within 20 m that looks within 34 degrees the same way.
-    `reference`, the map's own drive, lends a network's map the images of the samples; a map of images has
-    them. Raises EvaluationError where query and map share no ground, or the truth or reference do not fit.
+    seen only where the map holds a reference within 20 m that looks within 34 degrees the same way. By radius
+    an answer is right at most `radius_m` metres from the query. `reference`, the map's own drive, lends a
+    network's map the images of the samples; a map of images has them. Raises EvaluationError where query and
+    map share no ground, or the truth or reference do not fit; PlaceMapError where the query was not made as
+    the map was.
     """
     started = time.perf_counter()
-    show = item_images(where.map, query, reference)
-    truth = truth or truth_of(where.map, query, rule)
-    path, rows = where.path(query)
+    place_map = localizer.map
+    show = item_images(place_map, query, reference)
+    truth = truth or truth_of(place_map, query, rule, radius_m)
+    answered = localizer.answers(query, answers)
     settings = {
-        "map": where.map.settings,
-        "scorer": where.map.scorer,
-        "matcher": where.settings,
+        "answers": answers,
+        "map": place_map.settings,
+        "matcher": localizer.settings,
         "query": query.info.get("source"),
     }
-    xy = xy_in(where.map, query)
-    result = measure(path, truth, rows, where.map.items.position, query.t_us, settings, xy)
+    result = measure(
+        answered.path, truth, answered.rows, place_map.items.position, query.t_us, settings,
+        xy_in(place_map, query), answered.delay,
+    )  # fmt: skip
     result = dataclasses.replace(result, took_s=round(time.perf_counter() - started, 3))
     return sample(result, query.images, show) if show is not None else result
 
 
-def truth_of(place_map: PlaceMap, query: Traverse, rule: Rule = "places") -> Truth:
+def truth_of(
+    place_map: PlaceMap, query: Traverse, rule: Rule = "places", radius_m: float = RADIUS_M
+) -> Truth:
     """Which items of a map are right for each image of a query."""
     track = _same_zone(place_map, query.track)
     if isinstance(place_map.places, PlaceRuns):
@@ -62,6 +73,8 @@ def truth_of(place_map: PlaceMap, query: Traverse, rule: Rule = "places") -> Tru
     if track is None:
         raise EvaluationError("the query has no positions: give its track, or the truth as a matrix")
     _check_overlap(place_map, track)
+    if rule == "radius":
+        return by_radius(track.xy, place_map.items.position, radius_m)
     truth = _by_place(place_map, place_map.places, track)
     return only_views(truth, track, _references(place_map)) if rule == "view" else truth
 
@@ -104,7 +117,7 @@ def _middle_images(place_map: PlaceMap, reference: Traverse, items: NDArray[np.i
 
 def _by_place(place_map: PlaceMap, places: object, track: Track) -> Truth:
     assert isinstance(places, PlaceGrid)
-    if place_map.items_are_places:
+    if place_map.items.are_places:
         return by_places(places, track.xy)
     return by_cells(track.xy, place_map.items.position, places.cell_m, places.origin)
 
@@ -112,7 +125,7 @@ def _by_place(place_map: PlaceMap, places: object, track: Track) -> Truth:
 def _by_runs(place_map: PlaceMap, places: PlaceRuns, query: Traverse) -> Truth:
     """Query and map in step: place i of the query is place i of the map."""
     truth = by_places(places, query.xy)
-    if place_map.items_are_places:
+    if place_map.items.are_places:
         return truth
     columns = place_map.items.place
     return dataclasses.replace(truth, block=lambda part: truth.block(part)[:, columns], n_items=len(columns))
@@ -124,11 +137,10 @@ def _references(place_map: PlaceMap) -> Track:
 
 
 def _same_zone(place_map: PlaceMap, track: Track | None) -> Track | None:
-    zone = place_map.settings.get("zone")
-    if track is None or zone is None or [track.zone, track.northern] == zone:
+    zone = place_map.zone
+    if track is None or zone is None or (track.zone, track.northern) == zone:
         return track
-    moved: Track = track.in_zone(*zone)
-    return moved
+    return track.in_zone(*zone)
 
 
 def _check_overlap(place_map: PlaceMap, track: Track) -> None:

@@ -64,6 +64,12 @@ class Result:
     """Some queries with their images, to look at."""
 
     @property
+    def timing(self) -> str:
+        """Whether the answers are "live" ones or those of "hindsight"; "not said" where nobody said it."""
+        earlier = "hindsight" if "map" in self.settings else "not said"  # what older versions measured
+        return str(self.settings.get("answers", earlier))
+
+    @property
     def error_m(self) -> Floats:
         """(queries,) metres from each query to the item answered, accepted or not; NaN where unknown."""
         if self.query_xy is None or self.item_xy is None:

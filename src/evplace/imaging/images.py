@@ -15,14 +15,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core import families
 from evplace.core.errors import SettingsError, TraverseError
 from evplace.core.events import Events, Size
-from evplace.imaging import representations
 from evplace.imaging.representations import Representation
 from evplace.imaging.resampling import Resampler, Resize, axis_map
 from evplace.imaging.tones import Tone, toned
-
-KINDS = ("binary", "polarity", "count", "time-surface", "voxel")
 
 
 @dataclass(frozen=True)
@@ -53,10 +51,11 @@ class ImageSettings:
     """For camera images: plain (paper), normalised brightness and contrast, or edges (ours)."""
 
     def __post_init__(self) -> None:
-        if self.representation not in KINDS:
+        known = families.names("representations")
+        if self.representation not in known:
             raise SettingsError(
                 f"the setting 'representation' cannot be '{self.representation}': "
-                f"known are {', '.join(KINDS)}"
+                f"known are {', '.join(known)}"
             )
         if not 0 <= self.crop_bottom < 1:
             raise SettingsError(
@@ -69,9 +68,10 @@ class ImageSettings:
                 )
 
     @property
-    def channels(self) -> int:
-        """Channels of the image."""
-        return {"polarity": 2, "voxel": self.bins}.get(self.representation, 1)
+    def used(self) -> tuple[str, ...]:
+        """Which of the settings that belong to some representations make a difference to this one."""
+        used: tuple[str, ...] = families.load("representations", self.representation).used
+        return used
 
 
 class Imager:
@@ -153,15 +153,9 @@ def _blur_of_images(settings: ImageSettings) -> Resampler | None:
 
 
 def _representation(size: Size, settings: ImageSettings) -> Representation:
-    if settings.representation == "polarity":
-        return representations.Polarity(size)
-    if settings.representation == "count":
-        return representations.Count(size, settings.saturation)
-    if settings.representation == "time-surface":
-        return representations.TimeSurface(size, settings.tau_ms * 1000)
-    if settings.representation == "voxel":
-        return representations.Voxel(size, settings.bins, settings.saturation)
-    return representations.Binary(size)
+    kind = families.load("representations", settings.representation)
+    opened: Representation = kind(size, **{name: getattr(settings, name) for name in kind.used})
+    return opened
 
 
 def _resampled(resampler: Resampler, grid: NDArray[Any]) -> NDArray[np.float32]:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.events import Events, Size
-from evplace.imaging.images import Imager, ImageSettings
-from evplace.imaging.windows import Window, WindowSettings, open_windows
-from evplace.sources.cleaning import Cleaner, CleaningSettings, Mask
+from evplace.imaging.images import Imager
+from evplace.imaging.recipe import Recipe
+from evplace.imaging.windows import Window, open_windows
+from evplace.sources.cleaning import Cleaner, Mask
 
 
 class EventImage(NamedTuple):
@@ -26,18 +27,12 @@ class EventImage(NamedTuple):
 class EventImages:
     """Cleans a stream of events, cuts it into windows and makes images; packet sizes change nothing."""
 
-    def __init__(
-        self,
-        size: Size,
-        windows: WindowSettings | None = None,
-        images: ImageSettings | None = None,
-        cleaning: CleaningSettings | None = None,
-        mask: Mask | None = None,
-    ) -> None:
+    def __init__(self, size: Size, recipe: Recipe | None = None, mask: Mask | None = None) -> None:
         """For a sensor of `size` (width, height) in pixels; `mask` (H, W) is True at pixels to leave out."""
-        self._cleaner = Cleaner(size, cleaning, mask)
-        self._windows = open_windows(windows or WindowSettings())
-        self._imager = Imager(size, images)
+        recipe = recipe or Recipe()
+        self._cleaner = Cleaner(size, recipe.cleaning, mask)
+        self._windows = open_windows(recipe.windows)
+        self._imager = Imager(size, recipe.images)
 
     @property
     def cleaned(self) -> dict[str, int]:
@@ -58,14 +53,9 @@ class EventImages:
             yield EventImage(self._imager.image(window.t_us), window)
 
 
-def event_images(
-    packets: Iterable[Events],
-    size: Size,
-    windows: WindowSettings | None = None,
-    images: ImageSettings | None = None,
-) -> Iterator[EventImage]:
+def event_images(packets: Iterable[Events], size: Size, recipe: Recipe | None = None) -> Iterator[EventImage]:
     """The images of a whole recording, one after another, in bounded memory."""
-    yield from images_of(packets, EventImages(size, windows, images))
+    yield from images_of(packets, EventImages(size, recipe))
 
 
 def images_of(packets: Iterable[Events], stream: EventImages) -> Iterator[EventImage]:

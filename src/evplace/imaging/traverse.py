@@ -7,6 +7,7 @@ traverse.json; images are memory-mapped, so a traverse may be larger than memory
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,11 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import InputError, TraverseError
+from evplace.core.errors import InputError, SettingsError, TraverseError
 from evplace.core.storage import GrowingArray, new_folder, read_array, read_json, write_json
+from evplace.imaging.recipe import Recipe
 from evplace.sources.tracks import Track
 
-FORMAT = "evplace-traverse-1"
+FORMAT = "evplace-traverse-2"
+OLD_FORMAT = "evplace-traverse-1"
+"""Its recipe lies in pieces in `info`."""
 MARK = "traverse.json"
 """What tells a folder that was written here from any other: only such a one is replaced."""
 
@@ -36,8 +40,10 @@ class Traverse:
     """(n,) events in each window, 0 for an empty one; -1 for camera images."""
     track: Track | None = None
     """Where each image was taken, NaN where there is no fix; None without GPS."""
+    recipe: Recipe | None = None
+    """How its images were made; None where that is not known, as of images that others made."""
     info: dict[str, Any] = field(default_factory=dict)
-    """Where it comes from: source, sensor, the settings of windows and images, what was dropped."""
+    """Where it comes from: source, spacing, what was guessed, dropped and left out."""
     mask: NDArray[np.bool_] | None = None
     """(H, W) True at the sensor's pixels whose events were left out; None where all were taken."""
 
@@ -48,6 +54,7 @@ class Traverse:
         lengths |= {len(self.track.t_us)} if self.track is not None else set()
         if len(lengths) > 1:
             raise TraverseError(f"images, times, counts and track must be equally many, these are {lengths}")
+        self._check()
 
     def __len__(self) -> int:
         return len(self.images)
@@ -55,7 +62,9 @@ class Traverse:
     def __getitem__(self, part: slice) -> Traverse:
         """A stretch of the drive; images stay views."""
         track = self.track.at(self.t_us[part]) if self.track is not None else None
-        return Traverse(self.images[part], self.t_us[part], self.counts[part], track, self.info, self.mask)
+        return dataclasses.replace(
+            self, images=self.images[part], t_us=self.t_us[part], counts=self.counts[part], track=track
+        )
 
     @property
     def xy(self) -> NDArray[np.float64]:
@@ -67,29 +76,69 @@ class Traverse:
         with new_traverse(path, self.info, overwrite) as writer:
             for image, t_us, count in zip(self.images, self.t_us, self.counts, strict=True):
                 writer.add(image, int(t_us), int(count))
-            writer.track, writer.mask = self.track, self.mask
+            writer.recipe, writer.track, writer.mask = self.recipe, self.track, self.mask
 
     @classmethod
     def load(cls, path: str | Path) -> Traverse:
         """The traverse in the folder `path`; TraverseError where it is none or is damaged."""
         folder = Path(path)
+        what = f"the traverse {folder}"
         try:
-            info = read_json(folder / MARK, f"the traverse {folder}")
-            if info.get("format") != FORMAT:
-                raise TraverseError(
-                    f"{folder} is no traverse of this version: its format is {info.get('format')}"
-                )
-            images = read_array(folder / "images.npy", f"the traverse {folder}", memory_mapped=True)
-            t_us = read_array(folder / "t_us.npy", f"the traverse {folder}")
-            counts = read_array(folder / "counts.npy", f"the traverse {folder}")
-            track = _load_track(folder, t_us, info.get("track"))
+            about = read_json(folder / MARK, what)
+            recipe = _recipe(about, what)
+            images = read_array(folder / "images.npy", what, memory_mapped=True)
+            t_us, counts = read_array(folder / "t_us.npy", what), read_array(folder / "counts.npy", what)
             masked = (folder / "mask.npy").exists()
-            mask = read_array(folder / "mask.npy", f"the traverse {folder}") if masked else None
-        except TraverseError:
-            raise
+            mask = read_array(folder / "mask.npy", what) if masked else None
+            track = _load_track(folder, t_us, about.get("track"), what)
+            return cls(images, t_us, counts, track, recipe, about.get("info"), mask)  # type: ignore[arg-type]
+        except SettingsError as error:
+            raise TraverseError(f"{what} is damaged: {error}") from error
         except InputError as error:
             raise TraverseError(str(error)) from error
-        return cls(images, t_us, counts, track, info["info"], mask)
+
+    def _check(self) -> None:
+        """TraverseError where a part is not what it is said to be: folders are edited by other programs."""
+        check_array(self.images, "images", np.uint8, (3, 4))
+        for name in ("t_us", "counts"):
+            check_array(getattr(self, name), name, np.int64, (1,))
+        if np.any(np.diff(self.t_us) < 0):
+            at = int(np.argmax(np.diff(self.t_us) < 0)) + 1
+            raise TraverseError(f"the times run backwards at image {at}: images must stand in order of time")
+        if np.any(self.counts < -1):
+            raise TraverseError(
+                f"an image of {self.counts.min()} events: counts are 0 or more, -1 for frames"
+            )
+        if self.mask is not None:
+            check_array(self.mask, "mask", np.bool_, (2,))
+        if not isinstance(self.info, dict):
+            raise TraverseError(f"the info of a traverse is a JSON object, not {type(self.info).__name__}")
+
+
+def check_array(array: NDArray[Any], name: str, kind: type[np.generic], dimensions: tuple[int, ...]) -> None:
+    """TraverseError where an array has another type or another number of dimensions, or an empty side."""
+    if array.dtype != kind or array.ndim not in dimensions or 0 in array.shape:
+        wanted = " or ".join(map(str, dimensions))
+        raise TraverseError(
+            f"the array '{name}' is {array.dtype} {array.shape}: it must be {np.dtype(kind)} with {wanted} "
+            "dimensions, none of them empty"
+        )
+
+
+def _recipe(about: Mapping[str, Any], what: str) -> Recipe | None:
+    """The recipe that traverse.json holds, of this format or the one before."""
+    if about.get("format") == FORMAT:
+        recipe = about.get("recipe")
+        if recipe is None or isinstance(recipe, dict):
+            return None if recipe is None else Recipe.from_dict(recipe)
+        raise TraverseError(f"{what} is damaged: its recipe is no JSON object")
+    info = about.get("info")
+    if about.get("format") == OLD_FORMAT and isinstance(info, dict):
+        if "images" not in info:
+            return None
+        old = {name: info[name] for name in ("windows", "images", "cleaning") if name in info}
+        return Recipe.from_dict({**old, "kind": info.get("input"), "size": info.get("sensor")})
+    raise TraverseError(f"{what} has the format {about.get('format')!r}, this version reads {FORMAT}")
 
 
 class TraverseWriter:
@@ -101,6 +150,8 @@ class TraverseWriter:
         """Where each image was taken: set it before the end."""
         self.mask: NDArray[np.bool_] | None = None
         """(H, W) True at the pixels whose events were left out."""
+        self.recipe: Recipe | None = None
+        """How the images are made."""
         self.info = dict(info)
         """Saved at the end."""
         self.t_us: list[int] = []
@@ -130,7 +181,10 @@ class TraverseWriter:
         if self.track is not None:
             _save_track(self._folder, self.track)
             zone = {"zone": self.track.zone, "northern": self.track.northern}
-        write_json(self._folder / MARK, {"format": FORMAT, "track": zone, "info": self.info})
+        recipe = None if self.recipe is None else self.recipe.to_dict()
+        write_json(
+            self._folder / MARK, {"format": FORMAT, "track": zone, "recipe": recipe, "info": self.info}
+        )
 
     def discard(self) -> None:
         """Let go of a traverse that will not be used; harmless after `close`."""
@@ -163,11 +217,16 @@ def _save_track(folder: Path, track: Track) -> None:
     np.save(folder / "track.npy", np.stack(list(columns), axis=1))
 
 
-def _load_track(folder: Path, t_us: NDArray[np.int64], zone: dict[str, Any] | None) -> Track | None:
+def _load_track(folder: Path, t_us: NDArray[np.int64], zone: Any, what: str) -> Track | None:
     if zone is None:
         return None
-    columns = read_array(folder / "track.npy", f"the traverse {folder}")
-    if columns.shape != (len(t_us), 5):
-        raise TraverseError(f"{folder} is damaged: its track is {columns.shape} for {len(t_us)} images")
+    columns = read_array(folder / "track.npy", what)
+    if columns.shape != (len(t_us), 5) or columns.dtype != np.float64 or np.isinf(columns).any():
+        raise TraverseError(
+            f"{what} is damaged: its track is {columns.dtype} {columns.shape} for {len(t_us)} images"
+        )
+    number, northern = (zone.get("zone"), zone.get("northern")) if isinstance(zone, dict) else (None, None)
+    if not (isinstance(number, int) and 0 <= number <= 60 and isinstance(northern, bool)):
+        raise TraverseError(f"{what} is damaged: {zone!r} is no UTM zone")
     latitude, longitude, easting, northing, heading = np.ascontiguousarray(columns.T)
-    return Track(t_us, latitude, longitude, easting, northing, heading, zone["zone"], zone["northern"])
+    return Track(t_us, latitude, longitude, easting, northing, heading, number, northern)

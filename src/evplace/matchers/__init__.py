@@ -3,27 +3,28 @@
 A score row holds one number for each map item (a place or a reference image); larger is better. A
 distance d enters as the score -d. Items stand in the order in which the map's drive met them.
 
-Each file holds `Settings`, a frozen dataclass; `PRESETS`, named Settings (may be empty); and
-`matcher(settings, distances) -> Matcher`, where `distances` says that the scores are negated distances.
+A file holds a frozen dataclass of the same name, which is a `Matcher`: `matchers.Local(K=5)`.
 """
 
 from __future__ import annotations
 
-from types import ModuleType
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core import families as plugs
-from evplace.core import settings
-from evplace.core.errors import SettingsError
+from evplace.core import families
 
 Row = NDArray[np.floating[Any]]
 """(items,) scores of one query against every map item, larger is better."""
 
 Rows = NDArray[np.floating[Any]]
 """(queries, items) score rows in the order of the queries."""
+
+
+Judge = Callable[[NDArray[np.float64], float], NDArray[np.bool_]]
+"""(queries,) scores and a value of a parameter -> (queries,) accepted."""
 
 
 class Answer(NamedTuple):
@@ -59,8 +60,8 @@ class Path(NamedTuple):
         )
 
 
-class Matcher(Protocol):
-    """Remembers what a sequence needs; a fresh one for each traverse."""
+class Matching(Protocol):
+    """One traverse being matched: remembers what a sequence needs."""
 
     def step(self, row: Row) -> Answer | None:
         """Take the next query's row; say what is known by now, causally, or None while nothing is.
@@ -78,24 +79,60 @@ class Matcher(Protocol):
         """The answers for all rows so far, in hindsight where the method has any."""
 
 
-def open_matcher(name: str, preset: str | None = None, distances: bool = False, **values: object) -> Matcher:
-    """A fresh matcher by name; `values` are its settings, over those of `preset`.
+class Matcher(Protocol):
+    """A way to match, with its settings: a frozen dataclass, such as `matchers.Local(K=5)`.
+
+    A class may have `presets`, a mapping of names to objects of it.
+    """
+
+    causal: ClassVar[bool]
+    """Whether `path` is what `step` has said: nothing is gained by hindsight."""
+
+    def start(self, distances: bool = False) -> Matching:
+        """Begin a traverse; `distances` says that the scores are negated distances."""
+
+    def sweep(self, parameter: str | None = None) -> Sweep:
+        """How a precision-recall curve over a parameter is drawn; None: over the usual one."""
+
+
+class Sweep(NamedTuple):
+    """One parameter of a matcher over many values."""
+
+    parameter: str
+    """Its name."""
+    matcher: Matcher
+    """What runs, where one run serves all values."""
+    judge: Judge | None = None
+    """What is accepted at a value; None where the parameter steers the search: a run for each value."""
+    values: Callable[[NDArray[np.float64], bool], NDArray[np.float64]] = lambda best, _: best
+    """(n,) best scores of rows, and whether they are distances -> values worth trying."""
+
+
+def stepped(step: Callable[[Row], Answer | None], rows: Rows) -> tuple[Path, int]:
+    """What `step` says of each row (queries, items), and how many rows later it said the latest of it.
+
+    A query that it never speaks of is answered with -1.
+    """
+    known = [Answer(at, -1, np.nan, False) for at in range(len(rows))]
+    delay = 0
+    for at, row in enumerate(rows):
+        answer = step(row)
+        if answer is not None:
+            known[answer.query] = answer
+            delay = max(delay, at - answer.query)
+    return Path.of(known), delay
+
+
+def open_matcher(
+    name: str | Matcher, preset: str | None = None, distances: bool = False, **values: object
+) -> Matching:
+    """A fresh start of a matcher by name; `values` are its settings, over those of `preset`.
 
     Raises SettingsError for an unknown name, preset or setting; the text lists the known ones.
     """
-    module = plugs.load("matchers", name)
-    matcher: Matcher = module.matcher(_settings(module, name, preset, values), distances)
-    return matcher
+    matcher: Matcher = families.make("matchers", name, preset, values)
+    return matcher.start(distances)
 
 
-def resolved_settings(name: str, preset: str | None = None, **values: object) -> dict[str, Any]:
-    """All settings of a matcher as plain values; raises as `open_matcher` does."""
-    return settings.to_dict(_settings(plugs.load("matchers", name), name, preset, values))
-
-
-def _settings(module: ModuleType, name: str, preset: str | None, values: dict[str, object]) -> object:
-    if preset is not None and preset not in module.PRESETS:
-        known = ", ".join(sorted(module.PRESETS)) or "none"
-        raise SettingsError(f"the matcher '{name}' has no preset '{preset}': known are {known}")
-    base = module.PRESETS[preset] if preset is not None else None
-    return settings.make(module.Settings, values, base)
+def __getattr__(name: str) -> Any:
+    return families.class_called("matchers", name)

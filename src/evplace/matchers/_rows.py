@@ -70,6 +70,16 @@ class RowCheck:
         return table
 
 
+def above(score: NDArray[np.float64], value: float) -> NDArray[np.bool_]:
+    """A Judge: accepted is what scores above the value."""
+    return score > value
+
+
+def costs_below(score: NDArray[np.float64], value: float) -> NDArray[np.bool_]:
+    """A Judge: accepted is what costs less than the value, where a score is a cost, negated."""
+    return -score < value
+
+
 def as_table(rows: object) -> NDArray[np.floating[Any]]:
     """`rows` as (queries, items) contiguous floats; ScoresError where they are no such table."""
     table = np.asarray(rows)

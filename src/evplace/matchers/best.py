@@ -2,35 +2,43 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from evplace.matchers import Answer, Matcher, Path, Row, Rows
-from evplace.matchers._rows import Answers, RowCheck
+from evplace.matchers import Answer, Matching, Path, Row, Rows, Sweep
+from evplace.matchers._rows import Answers, RowCheck, above
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What global-max can be told."""
+class Best:
+    """Global-max; among equal scores the lowest item wins."""
 
     threshold: float | None = None
     """Stand by an item only where its score is above this, in units of the score. Default: stand by all,
     as the paper's Global-Max does."""
 
+    presets: ClassVar[Mapping[str, Best]]
+    causal: ClassVar[bool] = True
 
-PRESETS: dict[str, Settings] = {"paper": Settings()}
+    def start(self, distances: bool = False) -> Matching:  # noqa: ARG002 - a distance is the score -d
+        """See Matcher."""
+        return _BestMatching(self)
+
+    def sweep(self, parameter: str | None = None) -> Sweep:
+        """See Matcher."""
+        return Sweep(parameter or "threshold", self, above if parameter in (None, "threshold") else None)
 
 
-def matcher(settings: Settings, distances: bool = False) -> Matcher:  # noqa: ARG001 - a distance is the score -d
-    """A fresh global-max matcher; among equal scores the lowest item wins."""
-    return Best(settings)
+Best.presets = {"paper": Best()}
 
 
-class Best:
+class _BestMatching:
     """Remembers nothing but its answers."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Best) -> None:
         self._threshold = -np.inf if settings.threshold is None else settings.threshold
         self._check, self._answers = RowCheck(), Answers()
 

@@ -6,22 +6,27 @@ the graph would look at most of them.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
-from evplace.matchers import Answer, Matcher, Path, Row, Rows
+from evplace.matchers import Answer, Matching, Path, Row, Rows, Sweep
 from evplace.matchers._graph_search import IMPOSSIBLE
-from evplace.matchers._rows import RowCheck, as_table
+from evplace.matchers._rows import RowCheck, as_table, costs_below
 from evplace.matchers._viterbi import LONGEST_STEP, Viterbi, pieces
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The parameters of the full search, named as the graph's."""
+class DP:
+    """The full search, its parameters named as the graph's.
+
+    Costs are 1/similarity (a similarity below 1e-9 costs most), or distances. Among equally cheap paths the
+    one through the lower reference, seen from the end, wins.
+    """
 
     K: int = 5
     """Fan-out: from one query to the next the match moves by at most K references, either way. ism: 5."""
@@ -36,25 +41,28 @@ class Settings:
         if not 1 <= self.K <= LONGEST_STEP:
             raise SettingsError(f"K = {self.K} is out of range: it goes from 1 to {LONGEST_STEP}")
 
+    presets: ClassVar[Mapping[str, DP]]
+    causal: ClassVar[bool] = False
 
-PRESETS = {"ism": Settings(m=6.0, window="half_open")}
+    def start(self, distances: bool = False) -> Matching:
+        """See Matcher."""
+        return _FullSearch(self, distances)
+
+    def sweep(self, parameter: str | None = None) -> Sweep:
+        """See Matcher."""
+        return Sweep(parameter or "m", self, costs_below if parameter in (None, "m") else None)
 
 
-def matcher(settings: Settings, distances: bool = False) -> Matcher:
-    """A fresh search. Costs are 1/similarity (a similarity below 1e-9 costs most), or distances.
-
-    Among equally cheap paths the one through the lower reference, seen from the end, wins.
-    """
-    return FullSearch(settings, distances)
+DP.presets = {"ism": DP(m=6.0, window="half_open")}
 
 
-class FullSearch:
+class _FullSearch:
     """Remembers the scores and a step for each cell, 6 or 10 bytes: a method for drives, not for days.
 
     `step` answers with the end of the best path so far, `path` with the whole of it.
     """
 
-    def __init__(self, settings: Settings, distances: bool = False) -> None:
+    def __init__(self, settings: DP, distances: bool = False) -> None:
         self._check, self._distances = RowCheck(), distances
         self._m = np.inf if settings.m is None and distances else 3.7 if settings.m is None else settings.m
         steps = 2 * settings.K + (settings.window == "inclusive")

@@ -7,24 +7,28 @@ and image_sequence_localizer (isl), whose answers it gives.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import ScoresError, SettingsError
-from evplace.matchers import Answer, Matcher, Path, Row, Rows
+from evplace.matchers import Answer, Matching, Path, Row, Rows, Sweep
 from evplace.matchers import _graph_search as search
 from evplace.matchers._rows import RowCheck
 
-_WAYS = {"none": search.NONE, "all": search.ALL, "window": search.WINDOW, "hash": search.OFFERED}
+_WAYS = {"none": search.NONE, "all": search.ALL, "window": search.WINDOW, "high": search.OFFERED}
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The parameters of the graph matcher, under the originals' short names."""
+class Graph:
+    """The graph matcher, its parameters under the originals' short names.
+
+    Costs are 1/similarity (a similarity below 1e-9 never matches), or distances. Among equally cheap children
+    the lowest reference wins; ties between branches are broken in a fixed way.
+    """
 
     K: int = 5
     """Fan-out: from one query to the next the match moves by at most K references, either way.isl: 5."""
@@ -35,10 +39,10 @@ class Settings:
     """Non-matching cost: a node of the path that costs more is hidden, that is not accepted; five in a row
     mean lost. In units of 1/similarity, or of the distance. Default: 3.7 for similarities (isl, for cosines
     of network features), none for distances: nothing is hidden."""
-    relocalise: Literal["all", "window", "hash", "none"] = "all"
+    relocalise: Literal["all", "window", "high", "none"] = "all"
     """Where to look when lost, which is also how to start: at "all" references, in the "window" of K about
-    the query's own number (isl; it takes both drives to be aligned), at those that "hash" offers, or start
-    with all and never look again, "none" (opr)."""
+    the query's own number (isl; it takes both drives to be aligned), at those with "high" scores
+    (the upper 30 % of the row's range), or start with all and never look again, "none" (opr)."""
     memory: int = 1000
     """Score rows kept, for branches that lag behind the best path; older ones are given up. 0 keeps all."""
 
@@ -51,36 +55,33 @@ class Settings:
         if self.memory < 0 or self.memory == 1:
             raise SettingsError(f"memory = {self.memory} rows cannot work: take at least 2, or 0 for all")
 
+    presets: ClassVar[Mapping[str, Graph]]
+    causal: ClassVar[bool] = False
 
-PRESETS = {
-    "opr": Settings(alpha=0.7, m=6.0, relocalise="none", memory=0),
-    "isl": Settings(alpha=0.3, m=3.7, relocalise="all", memory=0),
+    def start(self, distances: bool = False) -> Matching:
+        """See Matcher."""
+        return _LazySearch(self, distances)
+
+    def sweep(self, parameter: str | None = None) -> Sweep:
+        """See Matcher."""
+        judges = self.relocalise == "none" and parameter in (None, "m")  # else m also says when it is lost
+        return Sweep(parameter or "m", self, _costs_at_most if judges else None, _costs)
+
+
+Graph.presets = {
+    "opr": Graph(alpha=0.7, m=6.0, relocalise="none", memory=0),
+    "isl": Graph(alpha=0.3, m=3.7, relocalise="all", memory=0),
 }
 
-Relocaliser = Callable[[int, Row], NDArray[np.int64]]
-"""The query's number and score row -> the references where it may be."""
 
-
-def matcher(settings: Settings, distances: bool = False) -> Matcher:
-    """A fresh graph matcher. Costs are 1/similarity (a similarity below 1e-9 never matches), or distances.
-
-    Among equally cheap children the lowest reference wins; ties between branches are broken in a fixed way.
-    """
-    return Graph(settings, distances)
-
-
-class Graph:
+class _LazySearch:
     """Remembers the searched part of the graph and the last rows.
 
     `step` answers with the end of the best path so far, `path` with the whole of it, which may differ from
     what `step` said. The score is the node's cost, negated.
     """
 
-    relocaliser: Relocaliser
-    """What "hash" asks for candidates: those of the score row itself, until another is put here."""
-
-    def __init__(self, settings: Settings, distances: bool = False) -> None:
-        self.relocaliser = high_scores
+    def __init__(self, settings: Graph, distances: bool = False) -> None:
         self._check, self._distances, self._memory = RowCheck(), distances, settings.memory
         m = np.inf if settings.m is None and distances else 3.7 if settings.m is None else settings.m
         self._rules = (settings.K, settings.alpha, m, _WAYS[settings.relocalise], distances)
@@ -123,7 +124,7 @@ class Graph:
                 *self._rules,
             )
             if done < len(table) and self._state[search.WANTED]:
-                offered = self.relocaliser(int(self._state[search.QUERIES]), table[done])
+                offered = high_scores(table[done])
 
     def path(self) -> Path:
         """The best path so far, one reference a query; not accepted are those that cost more than m."""
@@ -146,7 +147,15 @@ class Graph:
             self._heap = _grown(self._heap, len(self._nodes))
 
 
-def high_scores(query: int, row: Row) -> NDArray[np.int64]:  # noqa: ARG001 - a Relocaliser's signature
+def _costs_at_most(score: NDArray[np.float64], value: float) -> NDArray[np.bool_]:
+    return -score <= value
+
+
+def _costs(best: NDArray[np.float64], distances: bool) -> NDArray[np.float64]:
+    return -best if distances else 1 / np.maximum(best, 1e-9)
+
+
+def high_scores(row: Row) -> NDArray[np.int64]:
     """The references in the upper 30 % of the row's range: the cut that the originals put to hash votes."""
     least, most = row.min(), row.max()
     return np.flatnonzero(row >= least + 0.7 * (most - least))

@@ -7,22 +7,23 @@ reduced rank for scoring. All numbers, the form of the transitions, the softmax 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
-from evplace.matchers import Answer, Matcher, Path, Row, Rows
-from evplace.matchers._rows import RowCheck, as_table
+from evplace.matchers import Answer, Matching, Path, Row, Rows, Sweep
+from evplace.matchers._rows import RowCheck, above, as_table
 from evplace.matchers._seqslam_search import enhance
 from evplace.matchers._viterbi import LONGEST_STEP, Viterbi, pieces
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The parameters of the model; the defaults are ours."""
+class HMM:
+    """The model, uniform over the references at first. Among equals the lowest reference wins."""
 
     v_min: int = 0
     """Fewest references that one query moves on; 0 lets the query stand, less than 0 lets it turn back."""
@@ -65,23 +66,26 @@ class Settings:
         if self.R < 2 or self.R % 2:
             raise SettingsError(f"R = {self.R} cannot be halved: take an even number from 2")
 
+    presets: ClassVar[Mapping[str, HMM]] = {}
+    causal: ClassVar[bool] = False
 
-PRESETS: dict[str, Settings] = {}
+    def start(self, distances: bool = False) -> Matching:  # noqa: ARG002 - a distance is the score -d
+        """See Matcher."""
+        return _Model(self)
+
+    def sweep(self, parameter: str | None = None) -> Sweep:
+        """See Matcher."""
+        return Sweep(parameter or "threshold", self, above if parameter in (None, "threshold") else None)
 
 
-def matcher(settings: Settings, distances: bool = False) -> Matcher:  # noqa: ARG001 - a distance is the score -d
-    """A fresh model, uniform over the references. Among equals the lowest reference wins."""
-    return Model(settings)
-
-
-class Model:
+class _Model:
     """Remembers the log-probabilities and a step for each cell, 6 bytes.
 
     `step` answers by the rows so far, `path` by all of them, on the matrix of reduced rank. The score is the
     log of how much likelier the matched references are than chance, in `path` averaged over `length` queries.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: HMM) -> None:
         self._settings, self._check = settings, RowCheck()
         self._search: Viterbi | None = None
         self._rows: list[NDArray[np.float32]] = []
@@ -120,7 +124,7 @@ class Model:
         return self._search.extend(logs.astype(np.float64))
 
 
-def transitions(settings: Settings, items: int) -> Viterbi:
+def transitions(settings: HMM, items: int) -> Viterbi:
     """A search from anywhere, that moves on as the settings say."""
     s = settings
     steps = np.arange(s.v_min, s.v_max + 1)
@@ -129,7 +133,7 @@ def transitions(settings: Settings, items: int) -> Viterbi:
     return Viterbi(s.v_min, np.log(probability), float(np.log(s.jump / items)))
 
 
-def log_odds(rows: NDArray[np.floating[Any]], settings: Settings) -> NDArray[np.float32]:
+def log_odds(rows: NDArray[np.floating[Any]], settings: HMM) -> NDArray[np.float32]:
     """Log of each reference's probability over 1/items; (queries, items)."""
     items = rows.shape[1]
     if settings.emission == "probabilities":

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
-from evplace.matchers import Answer, Matcher, Path, Row, Rows
+from evplace.matchers import Answer, Matching, Path, Row, Rows, Sweep
 from evplace.matchers._rows import Answers, RowCheck
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The parameters of Algorithm 1, and a choice wherever the paper can be read in two ways."""
+class Local:
+    """Algorithm 1; scores are probabilities for the paper's thresholds, any score for your own.
+
+    Neighbours are items with neighbouring indices. Among equal scores the lowest item wins. Where the paper
+    can be read in two ways, there is a choice.
+    """
 
     K: int = 5
     """Items to either side of the last match that the local test looks at. The paper gives none;
@@ -45,25 +50,25 @@ class Settings:
         if least > self.K:
             raise SettingsError(f"K = {self.K} leaves the window empty: take at least {least}")
 
+    presets: ClassVar[Mapping[str, Local]]
+    causal: ClassVar[bool] = True
 
-PRESETS = {
-    "paper": Settings(first="argmax"),
-    "notebook": Settings(K=1, tau2=1e-5, last_item=False),
-}
+    def start(self, distances: bool = False) -> Matching:  # noqa: ARG002 - a distance is the score -d
+        """See Matcher."""
+        return _LocalMatching(self)
 
-
-def matcher(settings: Settings, distances: bool = False) -> Matcher:  # noqa: ARG001 - a distance is the score -d
-    """A fresh Algorithm 1; scores are probabilities for the paper's thresholds, any score for your own.
-
-    Neighbours are items with neighbouring indices. Among equal scores the lowest item wins.
-    """
-    return Local(settings)
+    def sweep(self, parameter: str | None = None) -> Sweep:
+        """See Matcher."""
+        return Sweep(parameter or "tau1", self)
 
 
-class Local:
+Local.presets = {"paper": Local(first="argmax"), "notebook": Local(K=1, tau2=1e-5, last_item=False)}
+
+
+class _LocalMatching:
     """Remembers the last match."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Local) -> None:
         self._check, self._answers = RowCheck(), Answers()
         self._rules = rules(settings)
         self._state = np.array([-1, 0], np.int64)
@@ -88,7 +93,7 @@ class Local:
         return answer
 
 
-def rules(settings: Settings) -> tuple[float, float, int, int, bool, bool, bool, bool]:
+def rules(settings: Local) -> tuple[float, float, int, int, bool, bool, bool, bool]:
     """The settings as `follow` takes them."""
     ahead = settings.K if settings.window == "inclusive" else settings.K - 1
     always_first, keep = settings.first == "argmax", settings.lost == "keep_last"

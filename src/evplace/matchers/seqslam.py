@@ -6,23 +6,28 @@ which the paper compares with. Items are reference images in the order of their 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
-from evplace.matchers import Answer, Matcher, Path, Row, Rows
+from evplace.matchers import Answer, Matching, Path, Row, Rows, Sweep
 from evplace.matchers import _seqslam_search as search
-from evplace.matchers._rows import Columns, RowCheck
+from evplace.matchers._rows import Columns, RowCheck, above, costs_below
 
 _WAYS = {"hybrid": search.HYBRID, "cone": search.CONE}
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The parameters of OpenSeqSLAM 2.0, with its defaults."""
+class SeqSLAM:
+    """OpenSeqSLAM 2.0, with its defaults; any score serves as a distance, negated.
+
+    Among equals the lowest reference wins. Where the original divides by a deviation of zero (flat
+    distances), the contrast is 0.
+    """
 
     ds: int = 15
     """Sequence length in queries; the first ds // 2 and the last ds - 1 - ds // 2 queries of a drive have no
@@ -69,22 +74,26 @@ class Settings:
                     f"v_min to v_max is {velocities} velocities: with this ds at most {queries}"
                 )
 
+    presets: ClassVar[Mapping[str, SeqSLAM]]
+    causal: ClassVar[bool] = False
 
-PRESETS = {
-    "openseqslam2": Settings(),
-    "openseqslam2013": Settings(ds=10, search="2013"),
-}
+    def start(self, distances: bool = False) -> Matching:  # noqa: ARG002 - a distance is the score -d
+        """See Matcher."""
+        return _SequenceSearch(self)
+
+    def sweep(self, parameter: str | None = None) -> Sweep:
+        """See Matcher."""
+        if parameter == "threshold":
+            below = replace(self, selection="threshold")
+            return Sweep(parameter, below, costs_below)
+        unique = replace(self, selection="window")
+        return Sweep(parameter or "mu", unique, above if parameter in (None, "mu") else None)
 
 
-def matcher(settings: Settings, distances: bool = False) -> Matcher:  # noqa: ARG001 - a distance is the score -d
-    """A fresh SeqSLAM; any score serves as a distance, negated. Among equals the lowest reference wins.
-
-    Where the original divides by a deviation of zero (flat distances), the contrast is 0.
-    """
-    return SeqSLAM(settings)
+SeqSLAM.presets = {"openseqslam2": SeqSLAM(), "openseqslam2013": SeqSLAM(ds=10, search="2013")}
 
 
-class SeqSLAM:
+class _SequenceSearch:
     """Remembers the last ds enhanced rows. `step` answers for the query in the middle of them.
 
     The original lowers all contrasts by the least of the whole matrix; `step` knows only the least so far,
@@ -92,7 +101,7 @@ class SeqSLAM:
     trajectory fits (the drive's ends, fewer queries or references than ds) the item is -1, the score NaN.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: SeqSLAM) -> None:
         self._settings, self._check = settings, RowCheck()
         self._offsets = offsets_of(settings)
         self._old = settings.search == "2013"
@@ -162,7 +171,7 @@ class SeqSLAM:
         return uniqueness, uniqueness > s.mu
 
 
-def offsets_of(settings: Settings) -> search.Offsets:
+def offsets_of(settings: SeqSLAM) -> search.Offsets:
     """The trajectories that the settings ask for."""
     s = settings
     if s.search == "2013":
@@ -170,12 +179,12 @@ def offsets_of(settings: Settings) -> search.Offsets:
     return search.trajectories(s.ds, s.v_min, s.v_max, s.v_step, every=s.search != "trajectory")
 
 
-def sequence_scores(rows: Rows, settings: Settings) -> NDArray[np.float64]:
+def sequence_scores(rows: Rows, settings: SeqSLAM) -> NDArray[np.float64]:
     """The whole (queries, items) matrix of sequence scores, smaller is better, NaN where nothing fits.
 
     For looking at and for tests: matching needs only the least of each row.
     """
-    seqslam = SeqSLAM(settings)
+    seqslam = _SequenceSearch(settings)
     table = np.full(np.shape(rows), np.inf, np.float32)
     found = np.full(np.shape(rows), np.inf, np.float32)
     seqslam._advance(rows, found)

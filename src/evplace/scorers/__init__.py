@@ -1,26 +1,55 @@
 """Images -> score rows: one number for each map item, larger is better. One file a scorer.
 
-Each file holds `Settings`, a frozen dataclass, and `scorer(place_map) -> Scorer`. The settings of a scorer
-belong to the map: they are chosen when it is learned.
+A file holds a frozen dataclass of the same name: `scorers.NCC(sigma=2)`. It is a `Scorer`, which learns a
+map's content from a drive and opens it later; or only a `Descriptor`, which turns images into vectors: then
+the images themselves are the map, and an image scores by the product of its vector with each of theirs.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core import families as plugs
-from evplace.core import settings
-from evplace.core.errors import PlaceMapError
-from evplace.placemap import PlaceMap
+from evplace.core import families
+from evplace.core.errors import PartError, PlaceMapError, TraverseError
+from evplace.imaging.traverse import Traverse
+from evplace.places import Places
+from evplace.scorers._search import Exact
 
 Rows = NDArray[np.float32]
 """(queries, items) scores."""
+Vectors = NDArray[np.float32]
+"""(images, dimensions)."""
+Content = Mapping[str, NDArray[Any] | bytes]
+"""What learning leaves behind: arrays by their names, and files by their names with a suffix."""
+REFERENCES = "references"
+"""The content of a map whose items are images: (items, h, w) or (items, h, w, C) uint8."""
 
 
-class Scorer(Protocol):
+@dataclass(frozen=True)
+class Learning:
+    """How a learning is watched, and where it goes on."""
+
+    progress: Callable[[int, int, float], None] | None = None
+    """Called with (step, steps, loss) after each step."""
+    checkpoint: Path | None = None
+    """A file name: a killed run of the same settings and images goes on from it."""
+
+
+class Learned(NamedTuple):
+    """What a scorer has learned."""
+
+    content: Content
+    images: NDArray[np.int64] | None = None
+    """(items,) the reference image that each map item is; None where the items are the places."""
+
+
+class OpenScorer(Protocol):
     """Compares images with a map."""
 
     distances: bool
@@ -30,23 +59,96 @@ class Scorer(Protocol):
         """(n, h, w) or (n, h, w, C) uint8 -> (n, items)."""
 
 
-def open_scorer(place_map: PlaceMap) -> Scorer:
-    """The scorer that a map was made for; PlaceMapError where this version does not know it."""
-    if place_map.scorer not in plugs.names("scorers"):
-        raise PlaceMapError(
-            f"the map wants the scorer '{place_map.scorer}', which this version does not have"
-        )
-    scorer: Scorer = plugs.load("scorers", place_map.scorer).scorer(place_map)
-    return scorer
+class Scorer(Protocol):
+    """A way to compare, with its settings. A class may have `presets`: names and objects of it."""
+
+    def learn(self, reference: Traverse, places: Places, learning: Learning) -> Learned:
+        """Learn the drive; `usable` says which of its images have a place."""
+
+    def open(self, content: Content) -> OpenScorer:
+        """Over what was learned; PlaceMapError where it is not such."""
 
 
-def checked_settings(name: str, values: dict[str, object]) -> dict[str, object]:
-    """The resolved settings of the scorer `name`; SettingsError for an unknown name or setting."""
-    return settings.to_dict(settings.make(plugs.load("scorers", name).Settings, values))
+@runtime_checkable
+class Descriptor(Protocol):
+    """A way to describe an image, with its settings."""
+
+    def describe(self, images: NDArray[np.uint8]) -> Vectors:
+        """(n, h, w) or (n, h, w, C) uint8 -> (n, dimensions); the product of two vectors is a score."""
 
 
-def references_of(place_map: PlaceMap) -> NDArray[np.uint8]:
+@dataclass(frozen=True)
+class Described:
+    """The scorer that a descriptor makes: the map is its images."""
+
+    descriptor: Descriptor
+
+    def learn(self, reference: Traverse, places: Places, _: Learning) -> Learned:
+        """See Scorer."""
+        return keep_images(reference, places)
+
+    def open(self, content: Content) -> OpenScorer:
+        """See Scorer."""
+        return _DescribedRows(self.descriptor, references_of(content))
+
+
+class _DescribedRows:
+    distances = False
+
+    def __init__(self, descriptor: Descriptor, references: NDArray[np.uint8]) -> None:
+        self._descriptor = descriptor
+        self._search = Exact(self._vectors(references))
+
+    def rows(self, images: NDArray[np.uint8]) -> Rows:
+        return self._search.rows(self._vectors(images))
+
+    def _vectors(self, images: NDArray[np.uint8]) -> Vectors:
+        vectors = self._descriptor.describe(images)
+        shape = getattr(vectors, "shape", None)
+        if shape is None or len(shape) != 2 or shape[0] != len(images) or not np.isfinite(vectors).all():
+            raise PartError(
+                f"{families.described('scorers', self._descriptor)} must give finite vectors "
+                f"({len(images)}, dimensions) for {len(images)} images, it gave {_kind_of(vectors)}"
+            )
+        return vectors
+
+
+def scorer_of(part: Scorer | Descriptor) -> Scorer:
+    """The part itself, or the scorer that a descriptor makes."""
+    return Described(part) if isinstance(part, Descriptor) else part
+
+
+def usable(reference: Traverse, places: Places) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """(n,) the place of each image of a drive, -1 for none; and (n,) which images can be learned.
+
+    TraverseError where none can.
+    """
+    labels = places.label(places.where(reference.xy))
+    used = (labels >= 0) & (reference.counts != 0)
+    if not used.any():
+        raise TraverseError("no image of the traverse has a place: check its track and its times")
+    return labels, used
+
+
+def keep_images(reference: Traverse, places: Places) -> Learned:
+    """All images that have a place, as they are."""
+    _, used = usable(reference, places)
+    return Learned({REFERENCES: np.asarray(reference.images[used])}, np.flatnonzero(used))
+
+
+def references_of(content: Content) -> NDArray[np.uint8]:
     """The reference images of a map; PlaceMapError where it holds none."""
-    if place_map.references is None:
-        raise PlaceMapError(f"the map holds no reference images, which the scorer '{place_map.scorer}' needs")
-    return place_map.references
+    images = content.get(REFERENCES)
+    if not isinstance(images, np.ndarray) or images.dtype != np.uint8 or images.ndim not in (3, 4):
+        raise PlaceMapError("the map holds no reference images, which its scorer needs: train it again")
+    return images
+
+
+def _kind_of(value: object) -> str:
+    if not isinstance(value, np.ndarray):
+        return type(value).__name__
+    return f"{value.dtype} {value.shape}" + ("" if np.isfinite(value).all() else " with NaN or infinity")
+
+
+def __getattr__(name: str) -> Any:
+    return families.class_called("scorers", name)

@@ -11,17 +11,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.placemap import PlaceMap
-from evplace.scorers import references_of
+from evplace.imaging.traverse import Traverse
+from evplace.places import Places
+from evplace.scorers import Content, Learned, Learning, Rows, keep_images, references_of
 
 
 @dataclass(frozen=True)
-class Settings:
-    """No settings: images are compared as they are."""
-
-
-class CosineScorer:
+class Cosine:
     """One score a reference image, from 0 to 1; an image that is all zero is like nothing: 0."""
+
+    def learn(self, reference: Traverse, places: Places, _: Learning) -> Learned:
+        """See Scorer."""
+        return keep_images(reference, places)
+
+    def open(self, content: Content) -> CosineRows:
+        """See Scorer."""
+        return CosineRows(references_of(content))
+
+
+class CosineRows:
+    """See OpenScorer."""
 
     distances = False
 
@@ -29,9 +38,9 @@ class CosineScorer:
         """From reference images (items, h, w) or (items, h, w, C)."""
         self._references = _unit(references)
 
-    def rows(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """See Scorer."""
-        rows: NDArray[np.float32] = np.clip(_unit(images) @ self._references.T, 0, 1)
+    def rows(self, images: NDArray[np.uint8]) -> Rows:
+        """See OpenScorer."""
+        rows: Rows = np.clip(_unit(images) @ self._references.T, 0, 1)
         return rows
 
 
@@ -41,8 +50,3 @@ def _unit(images: NDArray[np.uint8]) -> NDArray[np.float32]:
     length = np.linalg.norm(flat, axis=1, keepdims=True)
     unit: NDArray[np.float32] = flat / np.maximum(length, 1)
     return unit
-
-
-def scorer(place_map: PlaceMap) -> CosineScorer:
-    """Over the reference images of a map."""
-    return CosineScorer(references_of(place_map))

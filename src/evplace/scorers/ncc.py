@@ -5,23 +5,21 @@ Event images have their edges a pixel or two elsewhere at each pass; the blur fo
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
-from evplace.core.settings import make
-from evplace.placemap import PlaceMap
-from evplace.scorers import references_of
 
 FLAT = 1e-3
 """Below this length, in grey levels, what is left of an image is rounding."""
 
 
 @dataclass(frozen=True)
-class Settings:
-    """How images are prepared for the correlation."""
+class NCC:
+    """How images are prepared for the correlation; scores go from -1 to 1."""
 
     sigma: float = 2.0
     """Standard deviation of the Gaussian blur in pixels; 0 for none (ours)."""
@@ -36,31 +34,15 @@ class Settings:
         if self.sigma < 0 or self.width < 1 or self.height < 1:
             raise SettingsError("the settings of ncc need sigma of 0 or more, width and height of 1 or more")
 
-
-class NccScorer:
-    """One score a reference image, from -1 to 1."""
-
-    distances = False
-
-    def __init__(self, references: NDArray[np.uint8], settings: Settings) -> None:
-        """From reference images (items, h, w) or (items, h, w, C)."""
-        self._settings = settings
-        height, width = references.shape[1:3]
-        self._rows = _reduction(height, min(height, settings.height), settings.sigma)
-        self._columns = _reduction(width, min(width, settings.width), settings.sigma)
-        self._references = self._prepared(references)
-
-    def rows(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """See Scorer."""
-        rows: NDArray[np.float32] = self._prepared(images) @ self._references.T
-        return rows
-
-    def _prepared(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
+    def describe(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
         """(n, pixels): blurred, reduced, of mean 0 and length 1; an image without contrast becomes 0."""
+        height, width = images.shape[1:3]
+        rows = _reduction(height, min(height, self.height), self.sigma)
+        columns = _reduction(width, min(width, self.width), self.sigma)
         values = images.astype(np.float32)
-        if self._settings.log:
+        if self.log:
             values = np.log1p(values)
-        small = np.einsum("ih,nhw...,jw->nij...", self._rows, values, self._columns, optimize=True)
+        small = np.einsum("ih,nhw...,jw->nij...", rows, values, columns, optimize=True)
         flat = np.asarray(small, np.float32).reshape(len(small), -1)
         flat -= flat.mean(axis=1, keepdims=True)
         length = np.linalg.norm(flat, axis=1, keepdims=True)
@@ -68,6 +50,7 @@ class NccScorer:
         return unit
 
 
+@functools.cache
 def _reduction(n_in: int, n_out: int, sigma: float) -> NDArray[np.float32]:
     """(out, in): a Gaussian blur with mirrored borders, then the mean over each output's share."""
     edges = np.arange(n_out + 1) * n_in / n_out
@@ -91,8 +74,3 @@ def _blur(n: int, sigma: float) -> NDArray[np.float64]:
         source = np.where(source >= n, 2 * (n - 1) - source, source)
         matrix[np.arange(n), source] += weight
     return matrix
-
-
-def scorer(place_map: PlaceMap) -> NccScorer:
-    """Over the reference images of a map, with the settings that it was made with."""
-    return NccScorer(references_of(place_map), make(Settings, place_map.settings["scorer"]))

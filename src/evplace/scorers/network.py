@@ -1,26 +1,94 @@
-"""The trained network through ONNX Runtime: softmax probabilities of places, without torch."""
+"""The paper's network (Table 1): one score a place. Training needs torch; answering does not.
+
+The weights are kept as safetensors, and as the ONNX graph that answers.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import PlaceMapError
-from evplace.placemap import PlaceMap
+from evplace.core.errors import PlaceMapError, SettingsError
+from evplace.imaging.traverse import Traverse
+from evplace.places import Places
+from evplace.scorers import Content, Learned, Learning, usable
 
 BATCH = 64
 """Images scored at once: larger batches gain nothing and cost memory."""
+GRAPH, WEIGHTS = "network.onnx", "weights.safetensors"
 
 
 @dataclass(frozen=True)
-class Settings:
-    """The network has none of its own: see TrainSettings."""
+class Network:
+    """How the network is trained; a score is the softmax probability of a place."""
+
+    last_relu: bool = False
+    """ReLU on the last layer (paper, Table 1: yes). Off by default: a place whose logit falls below zero gets
+    no gradient from its own images any more."""
+    dropout: float = 0.0
+    """Share of activations dropped before each fully connected layer (paper: not mentioned)."""
+    optimiser: Literal["adam", "sgd"] = "adam"
+    """adam or sgd (paper: not said; 0.001 is Adam's usual rate)."""
+    learning_rate: float = 0.001
+    """(paper: 0.001)"""
+    batch: int = 64
+    """Images in a step (paper: 64)."""
+    steps: int = 1000
+    """Steps of one batch each (paper: "1000 iterations")."""
+    epochs: int = 0
+    """If above 0, this many passes over all images in place of `steps`."""
+    seed: int = 0
+    """Draws the first weights and the order of the images."""
+    augment: Literal["none", "light"] = "none"
+    """light: each image of a batch in another light (ours; see `augmentation`). For camera images."""
+    precision: Literal["auto", "float32", "bfloat16"] = "auto"
+    """auto takes bfloat16 where the processor has it: with channels-last 2.4 times plain float32."""
+
+    def __post_init__(self) -> None:
+        for name in ("learning_rate", "batch", "steps"):
+            if getattr(self, name) <= 0:
+                raise SettingsError(
+                    f"the setting '{name}' cannot be {getattr(self, name)}: it must be above 0"
+                )
+        if self.epochs < 0 or self.seed < 0:
+            raise SettingsError("the settings 'epochs' and 'seed' cannot be below 0")
+
+    presets: ClassVar[Mapping[str, Network]]
+
+    def learn(self, reference: Traverse, places: Places, learning: Learning) -> Learned:
+        """See Scorer; a run that was killed goes on from its checkpoint and ends in the same weights."""
+        labels, used = usable(reference, places)
+        from safetensors.numpy import save
+
+        from evplace.scorers._network.network_onnx import onnx_bytes
+        from evplace.scorers._network.training import image_shape, train_network
+
+        weights = train_network(reference.images, labels, used, places.n, self, learning)
+        graph = onnx_bytes(weights, image_shape(reference.images), self.last_relu)
+        return Learned({GRAPH: graph, WEIGHTS: save(weights)})
+
+    def open(self, content: Content) -> NetworkRows:
+        """See Scorer."""
+        return NetworkRows(file_of(content, GRAPH))
 
 
-class NetworkScorer:
-    """One score a place."""
+Network.presets = {
+    "paper": Network(last_relu=True),
+    "notebook": Network(dropout=0.5, optimiser="sgd", epochs=1000),
+}
+"""paper: as printed. notebook: as the author's published notebook does."""
+
+
+TrainSettings = Network
+"""Its name at the front door."""
+
+
+class NetworkRows:
+    """See OpenScorer: through ONNX Runtime, without torch."""
 
     distances = False
 
@@ -38,15 +106,16 @@ class NetworkScorer:
             raise PlaceMapError(f"the map's network.onnx cannot be run: {error}") from error
 
     def rows(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """See Scorer."""
+        """See OpenScorer."""
         layers = images[:, None] if images.ndim == 3 else np.moveaxis(images, -1, 1)
         parts = [layers[start : start + BATCH] for start in range(0, len(layers), BATCH)]
         scores = [self._session.run(None, {"images": np.ascontiguousarray(part)})[0] for part in parts]
         return np.concatenate(scores)
 
 
-def scorer(place_map: PlaceMap) -> NetworkScorer:
-    """The network of a map."""
-    if place_map.network is None:
-        raise PlaceMapError("the map holds no network: train it with the scorer 'network'")
-    return NetworkScorer(place_map.network)
+def file_of(content: Content, name: str) -> bytes:
+    """A file of a map with a network; PlaceMapError where it holds none."""
+    found = content.get(name)
+    if not isinstance(found, bytes):
+        raise PlaceMapError(f"the map holds no {name}: train it with the scorer 'network'")
+    return found

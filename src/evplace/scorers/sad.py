@@ -7,18 +7,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.placemap import PlaceMap
-from evplace.scorers import references_of
+from evplace.imaging.traverse import Traverse
+from evplace.places import Places
+from evplace.scorers import Content, Learned, Learning, Rows, keep_images, references_of
 from evplace.scorers._distances import sad
 
 
 @dataclass(frozen=True)
-class Settings:
-    """No settings: images are compared as they are."""
-
-
-class SadScorer:
+class SAD:
     """One score a reference image: the negated mean absolute difference of its pixels, in grey levels."""
+
+    def learn(self, reference: Traverse, places: Places, _: Learning) -> Learned:
+        """See Scorer."""
+        return keep_images(reference, places)
+
+    def open(self, content: Content) -> SADRows:
+        """See Scorer."""
+        return SADRows(references_of(content))
+
+
+class SADRows:
+    """See OpenScorer."""
 
     distances = True
 
@@ -26,11 +35,6 @@ class SadScorer:
         """From reference images (items, h, w) or (items, h, w, C)."""
         self._references = np.ascontiguousarray(references.reshape(len(references), -1))
 
-    def rows(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """See Scorer."""
+    def rows(self, images: NDArray[np.uint8]) -> Rows:
+        """See OpenScorer."""
         return -sad(np.ascontiguousarray(images.reshape(len(images), -1)), self._references)
-
-
-def scorer(place_map: PlaceMap) -> SadScorer:
-    """Over the reference images of a map."""
-    return SadScorer(references_of(place_map))

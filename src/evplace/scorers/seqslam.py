@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
-from evplace.core.settings import make
-from evplace.placemap import PlaceMap
-from evplace.scorers import references_of
+from evplace.imaging.traverse import Traverse
+from evplace.places import Places
+from evplace.scorers import Content, Learned, Learning, Rows, keep_images, references_of
 from evplace.scorers._distances import sad
 from evplace.scorers._seqslam_images import prepare
 
 
 @dataclass(frozen=True)
-class Settings:
-    """How images are prepared, with OpenSeqSLAM's defaults."""
+class SeqSLAM:
+    """How images are prepared, with OpenSeqSLAM's defaults; a score is the negated mean difference."""
 
     width: int = 64
     """Columns after the reduction (OpenSeqSLAM: 64)."""
@@ -36,26 +36,29 @@ class Settings:
                 "width and height from 1, and a patch of 0 (none) or from 2"
             )
 
+    def learn(self, reference: Traverse, places: Places, _: Learning) -> Learned:
+        """See Scorer."""
+        return keep_images(reference, places)
 
-class SeqSLAMScorer:
-    """One score a reference image: the negated mean absolute difference, in grey levels."""
+    def open(self, content: Content) -> SeqSLAMRows:
+        """See Scorer."""
+        return SeqSLAMRows(references_of(content), self)
+
+
+class SeqSLAMRows:
+    """See OpenScorer."""
 
     distances = True
 
-    def __init__(self, references: NDArray[np.uint8], settings: Settings) -> None:
+    def __init__(self, references: NDArray[np.uint8], settings: SeqSLAM) -> None:
         """From reference images (items, h, w) or (items, h, w, 3)."""
         self._settings = settings
         self._references = self._prepared(references)
 
-    def rows(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """See Scorer."""
+    def rows(self, images: NDArray[np.uint8]) -> Rows:
+        """See OpenScorer."""
         return -sad(self._prepared(images), self._references)
 
     def _prepared(self, images: NDArray[np.uint8]) -> NDArray[np.uint8]:
         s = self._settings
         return np.stack([prepare(image, (s.width, s.height), patch=s.patch or None) for image in images])
-
-
-def scorer(place_map: PlaceMap) -> SeqSLAMScorer:
-    """Over the reference images of a map, with the settings that it was made with."""
-    return SeqSLAMScorer(references_of(place_map), make(Settings, place_map.settings["scorer"]))

@@ -13,9 +13,9 @@ import utm
 from numpy.typing import NDArray
 
 from evplace.core.events import Events, Size
-from evplace.core.settings import to_dict
 from evplace.core.storage import GrowingArray, new_folder
-from evplace.imaging.images import Imager, ImageSettings, frame_image
+from evplace.imaging.images import Imager, frame_image
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import TraverseWriter, new_traverse
 from evplace.imaging.windows import WindowSettings
 from evplace.sources.simulators.esim import PRESETS, Simulator
@@ -51,8 +51,8 @@ def record_drive(out: Path, town: Town, settings: CitySettings, name: str, path:
             _Sensor(open_now, folder, preset, size, settings, drive_number(name, path), info)
             for preset in settings.sensors
         ]
-        colour_info = {**info, "input": "frames", "images": to_dict(ImageSettings())}
-        colour = open_now.enter_context(new_traverse(folder / COLOUR, colour_info))
+        colour = open_now.enter_context(new_traverse(folder / COLOUR, info))
+        colour.recipe = Recipe("frames", size)
         poses = np.array(_drive(film, settings, sensors, colour, drive_number(name, path), tick))
         for writer in (colour, *(sensor.writer for sensor in sensors)):
             writer.track = _track(np.array(colour.t_us), poses)
@@ -105,14 +105,8 @@ class _Sensor:
         self._simulator = Simulator(size, PRESETS[preset], settings.seed, number)
         self._imager = Imager(size)
         self._count = 0
-        made = {
-            "input": "events",
-            "preset": preset,
-            "sensor": list(size),
-            "windows": to_dict(WindowSettings(settings.dt)),
-            "images": to_dict(ImageSettings()),
-        }
-        self.writer = open_now.enter_context(new_traverse(folder / preset, {**info, **made}))
+        self.writer = open_now.enter_context(new_traverse(folder / preset, {**info, "preset": preset}))
+        self.writer.recipe = Recipe("events", size, WindowSettings(settings.dt))
         self._events: _EventColumns | None = None
         if settings.keep_events:
             self._events = open_now.enter_context(_recording(folder / f"{preset}.aedat4", size))

@@ -11,6 +11,7 @@ maps, and the result of each row.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import itertools
 from collections.abc import Iterator
@@ -25,16 +26,17 @@ from evplace.evaluation._evaluate import evaluate
 from evplace.evaluation.charts import accuracy_chart
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
-from evplace.placemap import PlaceMap
+from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
-from evplace.scorers._network.training import PRESETS, train
+from evplace.scorers import Learning
+from evplace.scorers.network import Network
 from evplace_lab.city import CitySettings, generate
 
 QUERIES = ("night-1", "rain-1", "day-2", "night-2", "rain-2")
 INPUTS = {"events": "ideal", "colour": "colour"}
 """Input -> the traverse of each drive that holds it."""
 MATCHERS = {"global-max": ("best", None), "Algorithm 1": ("local", "paper")}
-TRAINING = PRESETS["paper"]
+TRAINING = Network.presets["paper"]
 
 
 @dataclass(frozen=True)
@@ -88,21 +90,16 @@ def _maps(args: Args, day: Path) -> Iterator[tuple[str, PlaceMap]]:
         file = args.out / f"{name}.evp"
         if file.exists():
             place_map = PlaceMap.load(file)
-            if place_map.settings["train"]["seed"] != args.seed:
-                raise OutputError(f"{file} was trained with another seed: give another --out")
+            if place_map.scorer != dataclasses.replace(TRAINING, seed=args.seed):
+                raise OutputError(f"{file} was trained with another seed or otherwise: give another --out")
             yield name, place_map
             continue
         traverse = Traverse.load(day / part)
         assert traverse.track is not None  # the city knows where it is
         with progress(f"training on {name}") as show:
-            place_map = train(
-                traverse,
-                PlaceGrid.from_track(traverse.track),
-                settings=TRAINING,
-                seed=args.seed,
-                progress=functools.partial(_training_step, show),
-                checkpoint=args.out / f".{name}.checkpoint",
-            )
+            learning = Learning(functools.partial(_training_step, show), args.out / f".{name}.checkpoint")
+            scorer = dataclasses.replace(TRAINING, seed=args.seed)
+            place_map = train(traverse, PlaceGrid.from_track(traverse.track), scorer, learning=learning)
         place_map.save(file)
         yield name, place_map
 
@@ -135,15 +132,15 @@ def _print(rows: list[dict[str, object]], out: Path) -> None:
         shown = [cell[figure] for figure in ("accuracy", "accuracy_seen") for cell in cells]
         table.append([query, matcher, *map(_percent, shown), _percent(cells[0]["chance_seen"])])
     columns = ("query", "matcher", *INPUTS, "events, seen", "colour, seen", "chance, seen")
-    print_table("Accuracy in %: the map is day-1, the query as named", columns, table)
+    print_table("Accuracy in % of live answers: the map is day-1, the query as named", columns, table)
     print(f"Kept in {out}: result.json, report.png, the maps and the results. The same in Python:\n")
     print(
         f"  import evplace as ev\n"
         f'  day = ev.open_traverse("{out}/city/day-1/ideal")\n'
         f"  places = ev.PlaceGrid.from_track(day.track, cell_m=20)\n"
-        f"  street = ev.train(day, places, seed=0)\n"
+        f'  street = ev.train(day, places, preset="paper", seed=0)\n'
         f'  night = ev.open_traverse("{out}/city/night-1/ideal")\n'
-        f'  print(ev.evaluate(ev.Localizer(street, "local"), night).figures["accuracy"])'
+        f'  print(ev.evaluate(ev.Localizer(street, "local", "paper"), night).figures["accuracy"])'
     )
 
 

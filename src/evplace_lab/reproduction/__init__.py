@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import InputError, SettingsError
 from evplace.core.storage import locked, new_file, write_json
 from evplace.core.workers import run_all
@@ -77,7 +77,7 @@ def reproduce(
     OutputError where another process writes `out`.
     """
     folder, chosen = Path(out), choice or Choice()
-    family = plugs.load("reproduction", name)
+    family = families.load("reproduction", name)
     count = (os.cpu_count() or 1) if workers is None else workers
     _check(name, family, chosen, count)
     drives = _real_sets(data) if family.NEEDS == "data" else Cities(Path(city or folder / "city"), folder)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import evplace
-from evplace.core import settings
-from evplace.matchers import resolved_settings
-from evplace.scorers import checked_settings
-from evplace.scorers._network.training import PRESETS, TRAINED
+from evplace.core import families, settings
+from evplace.matchers import Matcher
+from evplace.scorers import Descriptor, Scorer
 
 Values = dict[str, Any]
 
@@ -91,11 +90,9 @@ class Case:
 
         Raises SettingsError for an unknown name or setting.
         """
-        matcher = resolved_settings(method.matcher, method.preset, **method.settings)
-        trained: Values | None = None
-        if method.scorer in TRAINED:
-            values = {**seen.train, **(train or {}), "seed": 0}
-            trained = settings.to_dict(settings.make(type(PRESETS["paper"]), values, PRESETS["paper"]))
+        matcher = families.make("matchers", method.matcher, method.preset, method.settings)
+        scorer = families.make("scorers", method.scorer, None, method.scorer_settings)
+        kept, trained = _settings_of(scorer, {**seen.train, **(train or {}), "seed": 0})
         return cls(
             database=database,
             query=query,
@@ -105,9 +102,9 @@ class Case:
             windows=seen.windows,
             images=seen.images,
             scorer=method.scorer,
-            scorer_settings=checked_settings(method.scorer, method.scorer_settings),
+            scorer_settings=kept,
             matcher=method.matcher,
-            matcher_settings=matcher,
+            matcher_settings=settings.to_dict(matcher),
             every=method.every,
             train=trained,
         )
@@ -116,6 +113,22 @@ class Case:
     def from_dict(cls, values: Values) -> Case:
         """The case that `to_dict` wrote."""
         return cls(**{**values, "origin": tuple(values["origin"])})
+
+    @property
+    def scorer_part(self) -> Scorer | Descriptor:
+        """The scorer, with its settings and those of the training."""
+        values = dict(self.scorer_settings)
+        if self.train is not None:
+            nested = _NETWORK in {one.name for one in fields(families.load("scorers", self.scorer))}
+            values |= {_NETWORK: self.train} if nested else self.train
+        part: Scorer | Descriptor = families.make("scorers", self.scorer, None, values)
+        return part
+
+    @property
+    def matcher_part(self) -> Matcher:
+        """The matcher, with its settings."""
+        part: Matcher = families.make("matchers", self.matcher, None, self.matcher_settings)
+        return part
 
     def with_seeds(self, seeds: int) -> list[Case]:
         """The same with each of the seeds 0, 1, ...; alone where nothing is trained."""
@@ -138,6 +151,21 @@ class Case:
         if self.train is not None:
             beside |= {"scorer", "scorer_settings"}
         return checksum({name: value for name, value in of_map.items() if name not in beside})
+
+
+_NETWORK = "network"
+"""The field of a scorer that says how its network is trained."""
+
+
+def _settings_of(scorer: Any, changed: Values) -> tuple[Values, Values | None]:
+    """A scorer's own settings, and those of its training where it has a seed: the paper's, but `changed`."""
+    trained = getattr(scorer, _NETWORK, scorer)
+    if not hasattr(trained, "seed"):
+        return settings.to_dict(scorer), None
+    paper = getattr(trained, "presets", {}).get("paper", trained)
+    own = {} if trained is scorer else settings.to_dict(scorer)
+    own.pop(_NETWORK, None)
+    return own, settings.to_dict(settings.make(type(trained), changed, paper))
 
 
 def checksum(values: Values) -> str:

@@ -11,11 +11,12 @@ import numpy as np
 
 from evplace.core.errors import InputError
 from evplace.core.events import Events
-from evplace.core.settings import make, to_dict
+from evplace.core.settings import make
 from evplace.core.storage import new_folder, read_json
 from evplace.evaluation._evaluate import Rule, truth_of
 from evplace.evaluation.truth import Truth
 from evplace.imaging.images import Imager, ImageSettings
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.tones import toned
 from evplace.imaging.traverse import Traverse, TraverseWriter
 from evplace.imaging.windows import WindowSettings
@@ -134,11 +135,11 @@ class Cities:
         windows = make(WindowSettings, case.windows or {})
         images = make(ImageSettings, case.images or {})
         given = Traverse.load(self.city / drive / case.part)
-        info = {**given.info, "windows": to_dict(windows), "images": to_dict(images)}
         with new_folder(folder) as partial:
-            writer = TraverseWriter(partial, info)
+            writer = TraverseWriter(partial, given.info)
             recording = open_recording(self._recording(drive, case.part))
             events = Events.concatenate(list(recording.packets()))
+            writer.recipe = Recipe("events", recording.size, windows, images)
             imager = Imager(recording.size, images)
             for t_us, window in zip(given.t_us.tolist(), _windows(events, given, windows), strict=True):
                 imager.add(window)

@@ -6,13 +6,27 @@ from typing import Any
 
 import numpy as np
 
+from evplace_lab.reproduction._runs import TIMINGS
 
-def row_of(outcomes: list[dict[str, Any]], rule: str) -> dict[str, Any]:
-    """The figures of one cell by a rule, in %, from the outcomes of its seeds."""
-    figures = [outcome["rules"][rule]["figures"] for outcome in outcomes]
+
+def rows_of(outcomes: list[dict[str, Any]], rule: str) -> list[dict[str, Any]]:
+    """The figures of one cell by a rule: of live answers, and of hindsight where that says something else."""
+    live, late = (_row(outcomes, rule, timing) for timing in TIMINGS)
+    return [live] if live == {**late, "answers": "live"} else [live, late]
+
+
+def label_of(row: dict[str, Any]) -> str:
+    """A row's method for people: live answers go without saying."""
+    return f"{row['matcher']} (hindsight)" if row["answers"] == "hindsight" else str(row["matcher"])
+
+
+def _row(outcomes: list[dict[str, Any]], rule: str, timing: str) -> dict[str, Any]:
+    """In %, from the outcomes of the seeds."""
+    figures = [outcome[timing][rule]["figures"] for outcome in outcomes]
     values = [round(100 * figure["accuracy"], 4) for figure in figures]
     return {
         "rule": rule,
+        "answers": timing,
         "mean": float(np.mean(values)),
         "spread": deviation(values),
         "seeds": len(values),

@@ -98,7 +98,7 @@ class RealSets:
             with np.load(self.data / real.arrays, allow_pickle=False) as arrays:
                 images = arrays[name]
             t_us = np.arange(len(images), dtype=np.int64) * 1_000_000
-            found = Traverse(images, t_us, np.full(len(images), -1, np.int64), info={"input": "frames"})
+            found = Traverse(images, t_us, np.full(len(images), -1, np.int64))
         return found[:: case.every]
 
     def places(self, day: Traverse, _: Case) -> PlaceRuns:

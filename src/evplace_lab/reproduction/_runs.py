@@ -8,7 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from evplace.core.storage import new_file, read_json, write_json
+from evplace.localizer import Answers
 from evplace_lab.reproduction._cases import Case
+
+TIMINGS: tuple[Answers, ...] = ("live", "hindsight")
+"""When answers are given: every case is answered in both ways."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,7 @@ class Runs:
 
     def done(self, case: Case) -> bool:
         """Whether a case has been answered, and its result is there where it is to be kept."""
-        if not self._file(case).exists():
+        if not self._file(case).exists() or not set(TIMINGS) <= set(self.found(case)):
             return False
         kept = self.result_folder(case) / "result.json"
         return not case.keep or (

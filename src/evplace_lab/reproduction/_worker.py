@@ -14,20 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import MissingExtraError
-from evplace.core.settings import make
 from evplace.core.workers import serve
 from evplace.evaluation import Result, measure, sample
 from evplace.evaluation._evaluate import item_images, xy_in
-from evplace.evaluation.sweeps import SWEPT, sweep
+from evplace.evaluation.sweeps import sweep
+from evplace.evaluation.truth import Truth
 from evplace.imaging.traverse import Traverse
-from evplace.localizer import Localizer
-from evplace.placemap import PlaceMap
-from evplace.scorers._network.training import TrainSettings, train
+from evplace.localizer import Answered, Answers, Localizer
+from evplace.matchers.local import Local
+from evplace.placemap import PlaceMap, train
+from evplace.scorers import Learning, Rows
 from evplace_lab.reproduction import Drives
 from evplace_lab.reproduction._cases import Case
 from evplace_lab.reproduction._cities import Cities
 from evplace_lab.reproduction._real_sets import RealSets
-from evplace_lab.reproduction._runs import Runs
+from evplace_lab.reproduction._runs import TIMINGS, Runs
 
 KINDS: dict[str, type[Cities] | type[RealSets]] = {kind.__name__: kind for kind in (Cities, RealSets)}
 
@@ -46,12 +47,11 @@ def _answer_group(cases: list[Case], drives: Drives, runs: Runs, say: Callable[[
     learned = _learned(cases[0], day, drives, runs)
     for _, group in itertools.groupby(cases, lambda case: (case.query, case.scorer, case.scorer_settings)):
         same = list(group)
-        settings = {**learned.settings, "scorer": same[0].scorer_settings}
-        place_map = dataclasses.replace(learned, scorer=same[0].scorer, settings=settings)
+        place_map = dataclasses.replace(learned, scorer=same[0].scorer_part)
         query = drives.opened(same[0].query, same[0])
-        rows: NDArray[np.float32] | None = None
+        rows: dict[str, Rows] = {}
         for case in same:
-            rows = _answer(case, place_map, query, day, rows, drives, runs)
+            _answer(case, place_map, query, day, rows, drives, runs)
             say(f"{case.query} {case.part} {case.scorer} {case.matcher}")
 
 
@@ -68,14 +68,14 @@ def _learned(case: Case, day: Traverse, drives: Drives, runs: Runs) -> PlaceMap:
     """The map of a case: read where it is there, else learned, and kept where that took long."""
     places = drives.places(day, case)
     if case.train is None:
-        return train(day, places, case.scorer, scorer_settings=case.scorer_settings)
+        return train(day, places, case.scorer_part)
     file = runs.map_file(case)
     if not file.exists():
         _use_one_thread()
-        settings = make(TrainSettings, case.train)
         began = time.process_time()
-        place_map = train(day, places, settings=settings, checkpoint=file.with_suffix(".checkpoint"))
-        place_map.settings["train_cpu_s"] = round(time.process_time() - began, 1)
+        learning = Learning(checkpoint=file.with_suffix(".checkpoint"))
+        place_map = train(day, places, case.scorer_part, learning=learning)
+        place_map.info["train_cpu_s"] = round(time.process_time() - began, 1)
         place_map.save(file)
     return PlaceMap.load(file)
 
@@ -85,52 +85,76 @@ def _answer(
     place_map: PlaceMap,
     query: Traverse,
     day: Traverse,
-    rows: NDArray[np.float32] | None,
+    rows: dict[str, Rows],
     drives: Drives,
     runs: Runs,
-) -> NDArray[np.float32]:
-    """Answer one case and keep what came out; returns the score rows, for the next one."""
+) -> None:
+    """Answer one case, live and in hindsight, and keep what came out; `rows` go from case to case."""
     began = time.process_time()
-    where = Localizer(place_map, case.matcher, **case.matcher_settings)
-    path, rows = where.path(query, rows)
+    where = Localizer(place_map, case.matcher_part)
+    truths = drives.truths(place_map, query, case)
     found: dict[str, Any] = {}
-    for rule, truth in drives.truths(place_map, query, case).items():
-        settings = {"key": runs.key(case), "map": place_map.settings, "matcher": where.settings}
-        positions, xy = place_map.items.position, xy_in(place_map, query)
-        result = measure(path, truth, rows, positions, query.t_us, settings, xy)
-        found[rule] = {"figures": result.figures}
-        first = len(found) == 1  # the paper's rule
-        if case.swept and first:
-            distances = where.scorer.distances
-            found[rule]["curve"] = _curve(case, rows, query, result, truth.right, distances).tolist()
-        if case.keep and first:
+    for timing in TIMINGS:
+        answered = where.answers(query, timing, rows.get(timing))
+        rows[timing] = answered.rows
+        found[timing] = _by_rules(case, where, query, answered, truths, timing)
+        if case.keep and timing == "live":
+            settings = {"key": runs.key(case), "answers": timing, **_settings(where)}
+            result = _measured(where, query, answered, next(iter(truths.values())), settings)
             show = item_images(place_map, query, day)
             assert show is not None  # the map's drive lends its images
             sample(result, query.images, show).save(runs.result_folder(case), overwrite=True)
     taken = {"cpu_s": round(time.process_time() - began, 2)}
-    taken["train_cpu_s"] = place_map.settings.get("train_cpu_s", 0.0)
-    runs.keep(case, {"rules": found, **taken})
-    return rows
+    taken["train_cpu_s"] = place_map.info.get("train_cpu_s", 0.0)
+    runs.keep(case, {**found, **taken})
+
+
+def _by_rules(
+    case: Case,
+    where: Localizer,
+    query: Traverse,
+    answered: Answered,
+    truths: dict[str, Truth],
+    timing: Answers,
+) -> dict[str, Any]:
+    """Rule -> figures, and by the first rule, which is the paper's, the curve where it is wanted."""
+    found: dict[str, Any] = {}
+    for rule, truth in truths.items():
+        result = _measured(where, query, answered, truth, {})
+        found[rule] = {"figures": result.figures}
+        if case.swept and len(found) == 1:
+            found[rule]["curve"] = _curve(where, answered.rows, query, result, truth.right, timing).tolist()
+    return found
+
+
+def _measured(
+    where: Localizer, query: Traverse, answered: Answered, truth: Truth, settings: dict[str, Any]
+) -> Result:
+    positions, xy = where.map.items.position, xy_in(where.map, query)
+    return measure(answered.path, truth, answered.rows, positions, query.t_us, settings, xy, answered.delay)
+
+
+def _settings(where: Localizer) -> dict[str, Any]:
+    return {"map": where.map.settings, "matcher": where.settings}
 
 
 def _curve(
-    case: Case,
-    rows: NDArray[np.float32],
+    where: Localizer,
+    rows: Rows,
     query: Traverse,
     result: Result,
     right: NDArray[np.bool_],
-    distances: bool,
+    timing: Answers,
 ) -> NDArray[np.float64]:
     """(values, 3) the swept parameter's value, recall (of the seen) and precision, in the order of recall.
 
     `right` (queries, items) is the truth.
     """
     filled = np.flatnonzero(query.counts != 0)
-    parameter = SWEPT[case.matcher]
-    others = {name: value for name, value in case.matcher_settings.items() if name != parameter}
-    values = _every_level(rows[filled]) if case.matcher == "local" else None
+    values = _every_level(rows[filled]) if isinstance(where.matcher, Local) else None
     points = []
-    for value, path in sweep(case.matcher, rows[filled], values, parameter, distances=distances, **others):
+    swept = sweep(where.matcher, rows[filled], values, None, where.scorer.distances, timing)
+    for value, path in swept:
         item = np.full(len(query), -1, np.int64)
         item[filled] = np.where(path.accepted, path.item, -1)
         accepted = (item >= 0)[result.judged]
@@ -142,7 +166,7 @@ def _curve(
     return np.asarray(np.nan_to_num(curve, posinf=1e30, neginf=-1e30), np.float64)
 
 
-def _every_level(rows: NDArray[np.float32]) -> list[float]:
+def _every_level(rows: Rows) -> list[float]:
     """Every value of tau1 at which some answer can change."""
     return [float(value) for value in np.unique(rows.max(axis=1))[::-1]] + [-1.0]
 

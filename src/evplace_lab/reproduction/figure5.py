@@ -16,14 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.evaluation.sweeps import SWEPT
 from evplace_lab.reproduction import Choice, Drives, Table
 from evplace_lab.reproduction._cases import Case
-from evplace_lab.reproduction._figures import deviation
+from evplace_lab.reproduction._figures import deviation, label_of
 from evplace_lab.reproduction._recipes import inputs, methods, recipes
-from evplace_lab.reproduction._runs import Runs
+from evplace_lab.reproduction._runs import TIMINGS, Runs
 
-TITLE = "Figure 5: precision against recall"
+TITLE = "Figure 5: precision against recall of live answers, and of hindsight where it is said"
 NEEDS = "city"
 INPUTS = ("events", "events, from 8 bit", "colour")
 FORMAT = "evplace-curves-1"
@@ -58,24 +57,12 @@ def collect(_: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
     """The curves of the first seed, with the average precision over all."""
     curves = []
     for recipe, name, method, group in _curves(choice):
-        points = [np.array(runs.found(case)["rules"]["places"]["curve"]).reshape(-1, 3) for case in group]
-        average = [average_precision(curve) for curve in points]
-        curves.append(
-            {
-                "panel": recipe.panel,
-                "query": recipe.query,
-                "input": name,
-                "sensor": inputs()[name].sensor,
-                "matcher": method,
-                "parameter": SWEPT[group[0].matcher],
-                "points": [
-                    [float(f"{value:.5g}") for value in point] for point in _corners(points[0]).tolist()
-                ],
-                "average_precision": float(np.mean(average)),
-                "spread": deviation(average),
-                "seeds": len(average),
-            }
-        )
+        outcomes = [runs.found(case) for case in group]
+        about = {"panel": recipe.panel, "query": recipe.query, "input": name, "sensor": inputs()[name].sensor}
+        about |= {"matcher": method, "parameter": group[0].matcher_part.sweep().parameter}
+        live, late = (_curve_of(outcomes, timing) for timing in TIMINGS)
+        found = [live] if live == {**late, "answers": "live"} else [live, late]
+        curves += [{**about, **curve} for curve in found]
     paper = [{"panel": recipe.panel, **curve} for recipe in _chosen() for curve in recipe.paper]
     return {"format": FORMAT, "title": TITLE, "curves": curves, "paper": paper}
 
@@ -90,7 +77,7 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
             average = f"{curve['average_precision']:.3f}{spread}"
             points = str(len(curve["points"]))
             lines.append(
-                [curve["input"], curve["matcher"], curve["parameter"], average, ends[0], ends[-1], points]
+                [curve["input"], label_of(curve), curve["parameter"], average, ends[0], ends[-1], points]
             )
         columns = ["input", "method", "swept", "average precision", "from recall, precision", "to", "points"]
         yield Table(f"Precision against recall, {panel}", columns, lines)
@@ -99,6 +86,18 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
 def average_precision(curve: NDArray[np.float64]) -> float:
     """Of points (n, 3) value, recall and precision in the order of recall."""
     return float(np.sum(np.diff(curve[:, 1], prepend=0.0) * curve[:, 2]))
+
+
+def _curve_of(outcomes: list[dict[str, Any]], timing: str) -> dict[str, Any]:
+    points = [np.array(outcome[timing]["places"]["curve"]).reshape(-1, 3) for outcome in outcomes]
+    average = [average_precision(curve) for curve in points]
+    return {
+        "answers": timing,
+        "points": [[float(f"{value:.5g}") for value in point] for point in _corners(points[0]).tolist()],
+        "average_precision": float(np.mean(average)),
+        "spread": deviation(average),
+        "seeds": len(average),
+    }
 
 
 def _curves(choice: Choice) -> Iterator[tuple[Recipe, str, str, list[Case]]]:

@@ -11,12 +11,12 @@ from typing import Any
 
 from evplace_lab.reproduction import Choice, Drives, Table
 from evplace_lab.reproduction._cases import Case, Input
-from evplace_lab.reproduction._figures import row_of, shown
+from evplace_lab.reproduction._figures import label_of, rows_of, shown
 from evplace_lab.reproduction._real_sets import RealSet, RealSets
 from evplace_lab.reproduction._recipes import real_methods
 from evplace_lab.reproduction._runs import Runs
 
-TITLE = "Real drives: accuracy in %"
+TITLE = "Real drives: accuracy in % of live answers, and of hindsight where it is said"
 NEEDS = "data"
 INPUTS: tuple[str, ...] = ()
 FORMAT = "evplace-table-1"
@@ -34,7 +34,8 @@ def collect(drives: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
         outcomes = [runs.found(case) for case in group]
         about = {"database": real.reference, "query": real.title, "input": "images", "sensor": real.title}
         for rule in real.rules:
-            rows.append({**about, "matcher": method, **row_of(outcomes, rule), "paper": None})
+            found = rows_of(outcomes, rule)
+            rows += [{**about, "matcher": method, **row, "paper": None} for row in found]
     return {"format": FORMAT, "title": TITLE, "rows": rows}
 
 
@@ -44,14 +45,14 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
     for query in dict.fromkeys(row["query"] for row in rows):
         of_set = [row for row in rows if row["query"] == query]
         rules = list(dict.fromkeys(row["rule"] for row in of_set))
-        cells = {(row["matcher"], row["rule"]): row for row in of_set}
+        cells = {(label_of(row), row["rule"]): row for row in of_set}
         chance = [
             "chance",
             *(f"{next(r['chance'] for r in of_set if r['rule'] == rule):.1f}" for rule in rules),
         ]
         lines = [
-            [matcher, *(shown(cells[matcher, rule]) for rule in rules)]
-            for matcher in dict.fromkeys(row["matcher"] for row in of_set)
+            [matcher, *(shown(cells[matcher, rule]) if (matcher, rule) in cells else "" for rule in rules)]
+            for matcher in dict.fromkeys(map(label_of, of_set))
         ]
         yield Table(f"{query}: accuracy in %", ["method", *rules], [chance, *lines])
 

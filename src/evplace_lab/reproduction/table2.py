@@ -12,11 +12,11 @@ from typing import Any
 
 from evplace_lab.reproduction import Choice, Drives, Table
 from evplace_lab.reproduction._cases import Case
-from evplace_lab.reproduction._figures import row_of, shown
+from evplace_lab.reproduction._figures import label_of, rows_of, shown
 from evplace_lab.reproduction._recipes import inputs, methods, recipes
 from evplace_lab.reproduction._runs import Runs
 
-TITLE = "Table 2: accuracy in %, the map is the day's drive on path 1"
+TITLE = "Table 2: accuracy in % of live answers, and of hindsight where it is said; map: day, path 1"
 NEEDS = "city"
 INPUTS = tuple(inputs())
 FORMAT = "evplace-table-1"
@@ -57,7 +57,8 @@ def collect(_: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
         about = {"database": recipe.database, "query": recipe.query, "input": name, "sensor": seen.sensor}
         for rule in RULES:
             paper = recipe.paper.get(method, {}).get(seen.paper) if rule == "places" else None
-            rows.append({**about, "matcher": method, **row_of(outcomes, rule), "paper": paper})
+            found = rows_of(outcomes, rule)
+            rows += [{**about, "matcher": method, **row, "paper": paper} for row in found]
     return {"format": FORMAT, "title": TITLE, "rows": rows}
 
 
@@ -96,14 +97,16 @@ def _table(title: str, rows: list[dict[str, Any]], figure: str) -> Iterator[Tabl
     if not rows:
         return
     names = list(dict.fromkeys(row["input"] for row in rows))
-    matchers = list(dict.fromkeys(row["matcher"] for row in rows))
-    cells = {(row["query"], row["matcher"], row["input"]): row for row in rows}
+    matchers = list(dict.fromkeys(map(label_of, rows)))
+    cells = {(row["query"], label_of(row), row["input"]): row for row in rows}
     lines = []
     for query in dict.fromkeys(row["query"] for row in rows):
         if figure == "mean":
             chances = [cells[query, matchers[0], name]["chance"] for name in names]
             lines.append([query, "chance", *(f"{chance:.1f}" for chance in chances), ""])
         for matcher in matchers:
+            if not any((query, matcher, name) in cells for name in names):
+                continue
             line = [cells.get((query, matcher, name)) for name in names]
             paper = _paper([cell for cell in line if cell is not None]) if figure == "mean" else ""
             lines.append(

@@ -31,7 +31,7 @@ def test_frames_and_poses(tmp_path: Path) -> None:
 def test_events_by_default_and_colours(tmp_path: Path) -> None:
     write_gta(tmp_path)
     events = open_traverse(tmp_path)
-    assert (events.info["input"], events.info["windows"]["dt"]) == ("events", "1/60")
+    assert (events.recipe.kind, events.recipe.windows.dt) == ("events", "1/60")
     assert open_traverse(tmp_path, kind="frames").images.shape == (6, 90, 160, 3)
 
 

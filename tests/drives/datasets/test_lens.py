@@ -16,7 +16,7 @@ def test_count_images_are_kept_as_they_are(tmp_path: Path) -> None:
     write_lens(tmp_path, "sunset2", images=3)
     assert drives(tmp_path) == ["sunset1", "sunset2"]
     found = open_traverse(tmp_path, drive="sunset1")
-    assert found.info["input"] == "frames"
+    assert found.recipe.kind == "frames"
     assert found.images.shape == (5, 7, 7)
     assert found.images[:, 3, 3].tolist() == [0, 1, 2, 3, 4]
     assert found.t_us.tolist() == [0, 1_000_000, 2_000_000, 3_000_000, 4_000_000]

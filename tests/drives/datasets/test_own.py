@@ -35,7 +35,7 @@ def test_recordings_images_and_logs_of_one_name(tmp_path: Path) -> None:
     assert np.argwhere(day.mask).tolist() == [[2, 1]]
     (tmp_path / "film_hot_pixels.txt").write_text("1,2\n")  # of no use for images
     film = open_traverse(tmp_path, drive="film")
-    assert film.info["input"] == "frames"
+    assert film.recipe.kind == "frames"
     assert film.track is not None
     assert film.track.known.all()
     with pytest.raises(DatasetError, match=r"night.npz has no GPS log: put one of night.nmea, night.gpx"):

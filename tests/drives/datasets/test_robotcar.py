@@ -30,7 +30,7 @@ def test_images_times_and_positions(tmp_path: Path) -> None:
     drive = open_drive(tmp_path)
     assert isinstance(drive.source, Film)
     assert drive.source.size == (32, 24)
-    assert drive.windows.dt == "1/16"
+    assert drive.recipe.windows.dt == "1/16"
     times = [t_us for t_us, _ in drive.source]
     assert (times[0], times[-1], len(times)) == (1_418_132_504_537_582, 1_418_132_505_037_582, 9)
     assert drive.track is not None
@@ -40,16 +40,16 @@ def test_images_times_and_positions(tmp_path: Path) -> None:
 def test_the_default_is_simulated_events_and_colours_if_asked(tmp_path: Path) -> None:
     write_robotcar(tmp_path, log="gps")
     events = open_traverse(tmp_path, drive="2014-12-09-13-21-02")
-    assert events.info["input"] == "events"
-    assert events.info["windows"]["dt"] == "1/16"
+    assert events.recipe.kind == "events"
+    assert events.recipe.windows.dt == "1/16"
     assert events.info["simulated"]["log_eps"] == 0.02
     assert events.images.ndim == 3
     assert events.counts.sum() > 0
     assert events.track is not None
     assert events.track.known.any()
     colours = open_traverse(tmp_path, kind="frames")
-    assert (colours.info["input"], colours.images.shape) == ("frames", (9, 90, 160, 3))
-    assert open_traverse(tmp_path, kind="events").info["input"] == "events"
+    assert (colours.recipe.kind, colours.images.shape) == ("frames", (9, 90, 160, 3))
+    assert open_traverse(tmp_path, kind="events").recipe.kind == "events"
 
 
 def test_times_and_images_must_fit(tmp_path: Path) -> None:

@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError, TraverseError
 from evplace.imaging.traverse import Traverse
-from evplace.placemap import PlaceMap
+from evplace.localizer import Localizer
+from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
-from evplace.scorers import open_scorer
+from evplace.scorers import Learning
 from evplace.scorers._network import checkpoint
-from evplace.scorers._network.training import PRESETS, TrainSettings, batches, train, train_network
+from evplace.scorers._network.training import batches, train_network
 
 torch = pytest.importorskip("torch", reason="the network needs the extra 'train'")
 
 from evplace.scorers._network.network import Network, NetworkSettings, to_input, weights_of  # noqa: E402 - only with torch
 from evplace.scorers._network.network_onnx import onnx_bytes  # noqa: E402
-from evplace.scorers.network import NetworkScorer  # noqa: E402
+from evplace.scorers.network import GRAPH, NetworkRows, TrainSettings  # noqa: E402
 
 Images = NDArray[np.uint8]
 
@@ -65,13 +66,13 @@ def test_the_onnx_graph_says_what_torch_says(shape: tuple[int, ...], last_relu: 
     images = some_images(5, shape)
     network(to_input(images))  # gives the batch norms statistics of their own
     network.eval()
-    scores = NetworkScorer(onnx_bytes(weights_of(network), image, last_relu)).rows(images)
+    scores = NetworkRows(onnx_bytes(weights_of(network), image, last_relu)).rows(images)
     wanted = torch.softmax(network(to_input(images)), 1).detach().numpy()
     np.testing.assert_allclose(scores, wanted, atol=1e-6)
 
 
 def test_training_learns_the_drive(network_map: PlaceMap, day: Traverse, places: PlaceGrid) -> None:
-    rows = open_scorer(network_map).rows(day.images)
+    rows = Localizer(network_map).rows(day.images)
     labels = places.label(day.xy)
     assert (rows.argmax(axis=1) == labels).mean() > 0.9
     np.testing.assert_allclose(rows.sum(axis=1), 1, atol=1e-5)
@@ -79,8 +80,8 @@ def test_training_learns_the_drive(network_map: PlaceMap, day: Traverse, places:
 
 def test_a_seed_gives_the_same_weights(day: Traverse, places: PlaceGrid) -> None:
     first, second, other = (train(day, places, steps=3, batch=8, seed=seed) for seed in (5, 5, 6))
-    assert first.network == second.network
-    assert first.network != other.network
+    assert first.content == second.content
+    assert first.content != other.content
 
 
 def test_a_killed_run_goes_on_to_the_same_weights(
@@ -95,29 +96,20 @@ def test_a_killed_run_goes_on_to_the_same_weights(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(day, places, steps=7, batch=8, dropout=0.2, progress=kill, checkpoint=file)
+        train(day, places, steps=7, batch=8, dropout=0.2, learning=Learning(kill, file))
     steps_left: list[int] = []
-    resumed = train(
-        day,
-        places,
-        steps=7,
-        batch=8,
-        dropout=0.2,
-        checkpoint=file,
-        progress=lambda step, steps, loss: steps_left.append(step),
-    )
+    learning = Learning(lambda step, steps, loss: steps_left.append(step), file)
+    resumed = train(day, places, steps=7, batch=8, dropout=0.2, learning=learning)
     assert steps_left == [5, 6, 7]
-    assert resumed.network == whole.network
+    assert resumed.content == whole.content
     assert not file.exists()
 
 
 def test_a_checkpoint_of_another_run_is_passed_over(day: Traverse, places: PlaceGrid, tmp_path: Path) -> None:
     file = tmp_path / "run.checkpoint"
     file.write_bytes(b"cut")
-    assert (
-        train(day, places, steps=2, batch=8, checkpoint=file).network
-        == train(day, places, steps=2, batch=8).network
-    )
+    after_all = train(day, places, steps=2, batch=8, learning=Learning(checkpoint=file))
+    assert after_all.content[GRAPH] == train(day, places, steps=2, batch=8).content[GRAPH]
 
 
 def test_batches_are_shuffled_passes() -> None:
@@ -131,18 +123,22 @@ def test_batches_are_shuffled_passes() -> None:
 def test_sgd_and_epochs(day: Traverse, places: PlaceGrid) -> None:
     seen: list[int] = []
     settings = TrainSettings(optimiser="sgd", epochs=2, batch=32)
-    train(day, places, settings=settings, progress=lambda step, steps, loss: seen.append(steps))
+    train(day, places, settings, learning=Learning(lambda step, steps, loss: seen.append(steps)))
     assert seen == [2 * -(-len(day) // 32)] * seen[0]
 
 
 def test_presets_say_what_the_paper_and_its_notebook_say() -> None:
-    paper = PRESETS["paper"]
+    paper = TrainSettings.presets["paper"]
     assert (paper.last_relu, paper.learning_rate, paper.batch, paper.steps) == (True, 0.001, 64, 1000)
-    assert (PRESETS["notebook"].dropout, PRESETS["notebook"].epochs) == (0.5, 1000)
+    notebook = TrainSettings.presets["notebook"]
+    assert (notebook.dropout, notebook.epochs) == (
+        0.5,
+        1000,
+    )
 
 
 def test_one_image_at_a_time_says_what_a_batch_says(network_map: PlaceMap, day: Traverse) -> None:
-    scorer = open_scorer(network_map)
+    scorer = Localizer(network_map)
     single = np.concatenate([scorer.rows(image[None]) for image in day.images])
     np.testing.assert_allclose(single, scorer.rows(day.images), atol=1e-6)
 
@@ -154,18 +150,25 @@ def test_settings_that_cannot_be_are_refused(wrong: dict[str, object]) -> None:
 
 
 def test_no_image_with_a_place_is_an_error(day: Traverse, places: PlaceGrid) -> None:
-    lost = Traverse(day.images, day.t_us, day.counts, None, day.info)
+    lost = Traverse(day.images, day.t_us, day.counts, None, day.recipe)
     with pytest.raises(TraverseError, match="no image of the traverse has a place"):
         train(lost, places, steps=1)
 
 
 def test_small_images_are_refused() -> None:
     with pytest.raises(SettingsError, match="at least 8x8"):
-        train_network(some_images(2, (7, 7)), np.zeros(2, np.int64), np.ones(2, np.bool_), 1, TrainSettings())
+        train_network(
+            some_images(2, (7, 7)),
+            np.zeros(2, np.int64),
+            np.ones(2, np.bool_),
+            1,
+            TrainSettings(),
+            Learning(),
+        )
 
 
 def test_one_place_only_is_learned(day: Traverse) -> None:
     assert day.track is not None
     one = PlaceGrid.from_track(day.track, cell_m=1e6)
     learned = train(day, one, steps=1, batch=4)
-    assert open_scorer(learned).rows(day.images[:2]).tolist() == [[1.0], [1.0]]
+    assert Localizer(learned).rows(day.images[:2]).tolist() == [[1.0], [1.0]]

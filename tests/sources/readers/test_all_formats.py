@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from made import MAKERS, SIZE, some_events
 
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import DamagedRecordingError, EvplaceError, RecordingError
 from evplace.core.events import Events
 from evplace.sources.readers import open_recording
@@ -31,7 +31,7 @@ in_this_process = pytest.mark.parametrize("form", sorted(set(MAKERS) - set(ISOLA
 
 
 def test_each_format_has_a_maker() -> None:
-    assert sorted(MAKERS) == plugs.names("readers")
+    assert sorted(MAKERS) == families.names("readers")
 
 
 def read_all(path: Path) -> tuple[list[Events], EvplaceError | None]:

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import DatasetError
-from evplace.imaging.images import ImageSettings
-from evplace.imaging.windows import WindowSettings
+from evplace.imaging.recipe import Recipe
 from evplace.sources.film import Film
 from evplace.sources.readers import Recording
 from evplace.sources.tracks import Track
@@ -42,10 +42,8 @@ class Drive:
     simulate: bool | None = False
     """Whether camera images become simulated events unless they are asked for themselves; None: never,
     because they are no film (event images, or photos in no order of time)."""
-    windows: WindowSettings = field(default_factory=WindowSettings)
-    """How events are cut, unless the user says otherwise."""
-    images: ImageSettings = field(default_factory=ImageSettings)
-    """How images are made, unless the user says otherwise."""
+    recipe: Recipe = field(default_factory=Recipe)
+    """How its images are made, unless the user says otherwise."""
 
 
 def open_drive(folder: str | Path, drive: str | None = None, dataset: str | None = None) -> Drive:
@@ -55,28 +53,36 @@ def open_drive(folder: str | Path, drive: str | None = None, dataset: str | None
     layout or of several, and for a drive that is not there; SettingsError for an unknown data set.
     """
     place = Path(folder)
-    part = plugs.load("datasets", _name_of(place, dataset))
-    known: list[str] = part.drives(place)
+    name = _name_of(place, dataset)
+    part = families.load("datasets", name)
+    with families.blaming("datasets", part):
+        known: list[str] = part.drives(place)
     if not known:
-        raise DatasetError(f"{place} holds no drive of {_short(part.__name__)}, which needs: {part.NEEDS}")
+        raise DatasetError(f"{place} holds no drive of {name}, which needs: {part.NEEDS}")
     if drive is None and len(known) > 1:
         raise DatasetError(f"{place} holds {len(known)} drives: say which with --drive: {', '.join(known)}")
     if drive is not None and drive not in known:
         raise DatasetError(f"{place} holds no drive '{drive}': it holds {', '.join(known)}")
-    opened: Drive = part.open_drive(place, drive or known[0])
+    with families.blaming("datasets", part):
+        opened: Drive = part.open_drive(place, drive or known[0])
     return opened
 
 
 def drives(folder: str | Path, dataset: str | None = None) -> list[str]:
     """The names of the drives in a data set's folder; errors as `open_drive`."""
     place = Path(folder)
-    found: list[str] = plugs.load("datasets", _name_of(place, dataset)).drives(place)
+    found: list[str] = families.load("datasets", _name_of(place, dataset)).drives(place)
     return found
 
 
 def matching(folder: Path) -> list[str]:
     """The data sets whose layout the folder has."""
-    return [name for name in plugs.names("datasets") if plugs.load("datasets", name).recognises(folder)]
+    return [name for name, part in families.loadable("datasets") if _recognises(part, folder)]
+
+
+def _recognises(part: Any, folder: Path) -> bool:
+    with families.blaming("datasets", part):
+        return bool(part.recognises(folder))
 
 
 def _name_of(folder: Path, dataset: str | None) -> str:
@@ -86,7 +92,7 @@ def _name_of(folder: Path, dataset: str | None) -> str:
         return dataset
     found = matching(folder)
     if not found:
-        known = ", ".join(plugs.names("datasets"))
+        known = ", ".join(families.names("datasets"))
         raise DatasetError(
             f"{folder} has the layout of no known data set: known are {known}; "
             "`evplace list datasets` says what each needs"
@@ -94,7 +100,3 @@ def _name_of(folder: Path, dataset: str | None) -> str:
     if len(found) > 1:
         raise DatasetError(f"{folder} may be {' or '.join(found)}: say which with --dataset")
     return found[0]
-
-
-def _short(module: str) -> str:
-    return module.rpartition(".")[2]

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import DatasetError, TrackError, TraverseError
 from evplace.drives.datasets import Drive
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.windows import WindowSettings
 from evplace.sources.film import film_of
 from evplace.sources.frames import Frames, is_frames
@@ -64,7 +65,7 @@ def open_drive(folder: Path, name: str) -> Drive:
         film_of(place / "images", Frames(files, t_us, False)),
         Track.local(t_us, xy, headings),
         simulate=True,
-        windows=WindowSettings(dt="1/60"),
+        recipe=Recipe(windows=WindowSettings(dt="1/60")),
     )
 
 

@@ -22,6 +22,7 @@ from pathlib import Path
 from evplace.core.errors import DatasetError
 from evplace.drives.datasets import Drive
 from evplace.imaging.images import ImageSettings
+from evplace.imaging.recipe import Recipe
 from evplace.sources.film import film_of
 from evplace.sources.frames import is_frames, open_frames
 
@@ -52,7 +53,7 @@ def open_drive(folder: Path, name: str) -> Drive:
     film = film_of(places[0], frames)
     width, height = film.size
     images = ImageSettings(width=width, height=height, blur=False, crop_bottom=0.0)
-    return Drive(film, simulate=None, images=images)
+    return Drive(film, simulate=None, recipe=Recipe(images=images))
 
 
 def _is_listing(file: Path) -> bool:

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import DatasetError, TraverseError
 from evplace.drives.datasets import Drive
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.windows import WindowSettings
 from evplace.sources.film import film_of
 from evplace.sources.frames import Frames, image_files, read_image
@@ -51,7 +52,12 @@ def open_drive(folder: Path, name: str) -> Drive:
     place = _places(folder)[name]
     images = place / "stereo" / "centre"
     frames = _frames(place, images)
-    return Drive(film_of(images, frames), _track(place), simulate=True, windows=WindowSettings(dt="1/16"))
+    return Drive(
+        film_of(images, frames),
+        _track(place),
+        simulate=True,
+        recipe=Recipe(windows=WindowSettings(dt="1/16")),
+    )
 
 
 def demosaiced(raw: NDArray[np.uint8]) -> NDArray[np.uint8]:

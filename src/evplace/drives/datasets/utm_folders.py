@@ -29,6 +29,7 @@ from evplace.core.errors import TrackError, TraverseError
 from evplace.core.storage import new_folder
 from evplace.drives.datasets import Drive
 from evplace.imaging.images import ImageSettings
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import Traverse
 from evplace.sources.film import film_of
 from evplace.sources.frames import SUFFIXES, Frames, read_image
@@ -78,7 +79,9 @@ def open_drive(folder: Path, name: str) -> Drive:
     like = read_image(places[0].file)
     frames = Frames(tuple(place.file for place in places), t_us, timed, lambda file: _alike(file, like))
     film = film_of(files[0].parent, frames)
-    return Drive(film, _track(places, t_us), simulate=None, images=ImageSettings(crop_bottom=0.0))
+    return Drive(
+        film, _track(places, t_us), simulate=None, recipe=Recipe(images=ImageSettings(crop_bottom=0.0))
+    )
 
 
 def write_images(traverse: Traverse, folder: str | Path, overwrite: bool = False) -> int:

@@ -11,13 +11,14 @@ Algorithm 1's thresholds are probabilities (tau2 = 0.01 is just above 1/N for N 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import MissingExtraError, SettingsError
+from evplace.core.errors import MissingExtraError, PlaceMapError, SettingsError
 
 try:
     import torch
@@ -89,6 +90,19 @@ def to_input(images: NDArray[np.uint8], device: str = "cpu") -> Tensor:
     layers = torch.from_numpy(np.ascontiguousarray(images)).to(device)
     layers = layers.unsqueeze(1) if layers.ndim == 3 else layers.permute(0, 3, 1, 2)
     return layers.contiguous(memory_format=torch.channels_last).float().div_(255)
+
+
+def network_of(weights: Mapping[str, Tensor], settings: NetworkSettings) -> Network:
+    """The network that has these weights; PlaceMapError where they are not such a network's."""
+    try:
+        places, channels = len(weights["full3.bias"]), weights["conv1.weight"].shape[1]
+        columns = weights["full1.weight"].shape[1] // CHANNELS[-1]
+        # Only the number of pixels matters to the layers: any height and width with their product will do.
+        network = Network(places, (channels, 8, 8 * columns), settings)
+        network.load_state_dict(weights, strict=False)  # but for the counts of batches, which nothing reads
+    except (KeyError, IndexError, RuntimeError) as error:
+        raise PlaceMapError(f"the map's weights are not those of the network: {error}") from error
+    return network
 
 
 def weights_of(network: Network) -> Weights:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import RecordingError
 from evplace.core.events import Size
 from evplace.sources.readers._source import Block, Hints, Source
@@ -52,7 +52,7 @@ def open_recording(
         raise RecordingError(f"unknown time unit '{time_unit}': known are {', '.join(TIME_UNITS)}")
     head = _head(file)
     name = _found(file, head) if format is None else format
-    reader = plugs.load("readers", name)
+    reader = families.load("readers", name)
     try:
         source: Source = reader.read(file, Hints(size, time_unit))
     except OSError as error:
@@ -94,9 +94,9 @@ def _head(path: Path) -> bytes:
 
 def _found(path: Path, head: bytes) -> str:
     """The name of the first reader that knows the content."""
-    known = plugs.names("readers")
+    known = families.names("readers")
     for name in known:
-        if plugs.load("readers", name).matches(path, head):
+        if families.load("readers", name).matches(path, head):
             return name
     what = "the folder" if path.is_dir() else "the content"
     raise RecordingError(f"{path}: {what} is of no known recording format: known are {', '.join(known)}")

@@ -76,6 +76,11 @@ class Recording:
             raise fault
 
     @property
+    def states_size(self) -> bool:
+        """Whether the file says its sensor's size."""
+        return self._source.size is not None
+
+    @property
     def wraps(self) -> int:
         """How often the file's clock started anew between the first and the last event delivered so far."""
         turn_us, zero_us = self._source.turn_us, self._source.zero_us

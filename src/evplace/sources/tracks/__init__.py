@@ -10,8 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import ModuleType
 
-from evplace.core import families as plugs
-from evplace.core import settings
+from evplace.core import families, settings
 from evplace.core.errors import SettingsError, TrackError
 from evplace.sources.tracks._fixes import Fixes
 from evplace.sources.tracks._track import Track
@@ -57,9 +56,9 @@ def _format_of(path: Path) -> ModuleType:
         raise TrackError(f"cannot read the GPS log {path}: {error.strerror}") from error
     if not head.strip():
         raise TrackError(f"{path} is empty: give a GPS log with fixes in it")
-    known = plugs.names("tracks")
+    known = families.names("tracks")
     for name in known:
-        part = plugs.load("tracks", name)
+        part: ModuleType = families.load("tracks", name)
         if part.recognises(head):
             return part
     raise TrackError(f"{path} is no GPS log that is known here: give one of {', '.join(known)}")

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import DamagedRecordingError, OutputError
 from evplace.core.events import Events, Size
 from evplace.core.storage import new_file
@@ -30,7 +30,7 @@ def write_recording(
     unknown suffix, an output that exists (unless `overwrite`) or a full disk.
     """
     target = Path(path)
-    module = plugs.load("writers", format or _by_suffix(target))
+    module = families.load("writers", format or _by_suffix(target))
     counted = _Counted(packets)
     with new_file(target, overwrite) as partial:
         module.write(partial, counted, size)
@@ -41,7 +41,7 @@ def write_recording(
 
 def _by_suffix(path: Path) -> str:
     """The writer whose suffix the path has."""
-    suffixes = {plugs.load("writers", name).SUFFIX: name for name in plugs.names("writers")}
+    suffixes = {families.load("writers", name).SUFFIX: name for name in families.names("writers")}
     if path.suffix.lower() not in suffixes:
         known = ", ".join(f"{suffix} ({name})" for suffix, name in suffixes.items())
         raise OutputError(f"cannot tell the format of {path} from its suffix: known are {known}")
