@@ -13,15 +13,16 @@ A run that was stopped goes on where it was when the same command is given again
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
+from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
 from evplace.cli._track import TrackFlags
-from evplace.core import settings as settings_room
 from evplace.core.errors import TraverseError
 from evplace.core.storage import check_new_folder
 from evplace.drives.to_traverse import open_traverse
@@ -40,6 +41,9 @@ from evplace.sources.cleaning import CleaningSettings
 class Args(TrackFlags):
     """Flags of `evplace train`."""
 
+    PARTS: ClassVar[tuple[Part, ...]] = (*TrackFlags.PARTS, Part.of("scorers", "scorer"))
+    TABLE_PRESETS: ClassVar[Mapping[str, Mapping[str, Any]]] = {"train": PRESETS}
+
     drive: tyro.conf.Positional[Path]
     """The drive to learn: an event recording, a folder of images, or a traverse folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
@@ -50,12 +54,12 @@ class Args(TrackFlags):
     """Without GPS: how many images make a place."""
     tolerance: int = 0
     """Without GPS: how many places off an answer may be."""
-    scorer: str = "network"
-    """network, sad or ncc."""
-    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    scorer: Annotated[str, a_part_of("scorers")] = "network"
+    """What compares images with the map; `evplace list scorers` says what each does."""
+    set: Pairs = ()
     """A setting of the scorer, as name=value."""
-    preset: Literal["paper", "notebook"] | None = None
-    """paper: as printed; notebook: as the author's published notebook does."""
+    preset: Annotated[str | None, a_preset_of(PRESETS)] = None
+    """A preset of the training. paper: as printed; notebook: as the author's published notebook does."""
     train: Annotated[TrainSettings, tyro.conf.arg(name="")] = field(default_factory=TrainSettings)
     windows: Annotated[WindowSettings, tyro.conf.arg(name="")] = field(default_factory=WindowSettings)
     images: Annotated[ImageSettings, tyro.conf.arg(name="")] = field(default_factory=ImageSettings)
@@ -63,8 +67,6 @@ class Args(TrackFlags):
     spacing: Annotated[SpacingSettings, tyro.conf.arg(name="")] = field(default_factory=SpacingSettings)
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
-    settings: Path | None = None
-    """A TOML file with any of these settings; train, windows, images, cleaning and spacing are its tables."""
     size: tuple[int, int] | None = None
     """Width and height of the sensor in pixels, where the file does not say."""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
@@ -78,7 +80,7 @@ class Args(TrackFlags):
 def run(args: Args) -> int:
     """Learn and save the map."""
     check_new_folder(args.out, args.overwrite, MARK)  # said before the training, not after it
-    scorer_settings = checked_settings(args.scorer, settings_room.from_pairs(args.set))
+    scorer_settings = checked_settings(args.scorer, dict(args.set))
     day = open_traverse(
         args.drive, args.opened_track(), args.windows, args.images, args.size, args.time_unit,
         args.cleaning, args.spacing, args.mask,
@@ -90,7 +92,7 @@ def run(args: Args) -> int:
             day,
             places,
             args.scorer,
-            _train_settings(args),
+            args.train,
             progress=lambda step, steps, loss: show(step, steps, f"loss {loss:.3f}"),
             checkpoint=args.out.with_name(f".{args.out.name}.checkpoint"),
             scorer_settings=scorer_settings,
@@ -121,12 +123,3 @@ def _places(args: Args, day: Traverse) -> Places:
             "that are stretches of images"
         )
     return PlaceGrid.from_track(day.track, args.cell_m)
-
-
-def _train_settings(args: Args) -> TrainSettings:
-    """The preset's settings, under those flags that differ from the defaults."""
-    if args.preset is None:
-        return args.train
-    plain, given = settings_room.to_dict(TrainSettings()), settings_room.to_dict(args.train)
-    changed = {name: value for name, value in given.items() if value != plain[name]}
-    return settings_room.make(TrainSettings, changed, PRESETS[args.preset])

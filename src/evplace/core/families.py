@@ -8,13 +8,18 @@ from __future__ import annotations
 import functools
 import importlib
 import pkgutil
+from collections.abc import Mapping
 from types import ModuleType
+from typing import Any
 
 from evplace.core.errors import SettingsError
 
 
 def names(family: str) -> list[str]:
-    """The parts of a family, for example `names("matchers")`: the public files of its folder, sorted."""
+    """The parts of a family, for example `names("matchers")`: the public files of its folder, sorted.
+
+    A family of another package is named with its package: `names("evplace_lab.reproduction")`.
+    """
     return list(_names(family))
 
 
@@ -34,7 +39,15 @@ def load(family: str, name: str) -> ModuleType:
     return importlib.import_module(f"{_package(family)}.{name}")
 
 
+def settings_of(family: str, name: str) -> tuple[type[Any], Mapping[str, Any]]:
+    """The settings of a part, a dataclass, and its presets; SettingsError as `load`."""
+    part = load(family, name)
+    return part.Settings, getattr(part, "PRESETS", {})
+
+
 def _package(family: str) -> str:
     """Where the files of a family lie."""
+    if "." in family:
+        return family
     group = {"readers": "sources.", "writers": "sources.", "tracks": "sources.", "datasets": "drives."}
     return f"evplace.{group.get(family, '')}{family}"

@@ -61,7 +61,8 @@ def sweep(
         raise SettingsError(f"the matcher '{name}' has no usual parameter to sweep: name one")
     if name == "seqslam":
         others = {"selection": "threshold" if parameter == "threshold" else "window", **others}
-    resolved = settings.make(module.Settings, others, module.PRESETS[preset] if preset else None)
+    base = settings.preset_of(f"the matcher '{name}'", module.PRESETS, preset)
+    resolved = settings.make(module.Settings, others, base)
     # The graph's m also says when it is lost, unless it never looks again.
     steers = name == "graph" and resolved.relocalise != "none"
     judge = None if steers else _JUDGES.get((name, parameter))

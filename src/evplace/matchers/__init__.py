@@ -9,7 +9,6 @@ Each file holds `Settings`, a frozen dataclass; `PRESETS`, named Settings (may b
 
 from __future__ import annotations
 
-from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -17,7 +16,6 @@ from numpy.typing import NDArray
 
 from evplace.core import families as plugs
 from evplace.core import settings
-from evplace.core.errors import SettingsError
 
 Row = NDArray[np.floating[Any]]
 """(items,) scores of one query against every map item, larger is better."""
@@ -83,19 +81,15 @@ def open_matcher(name: str, preset: str | None = None, distances: bool = False, 
 
     Raises SettingsError for an unknown name, preset or setting; the text lists the known ones.
     """
-    module = plugs.load("matchers", name)
-    matcher: Matcher = module.matcher(_settings(module, name, preset, values), distances)
+    matcher: Matcher = plugs.load("matchers", name).matcher(_settings(name, preset, values), distances)
     return matcher
 
 
 def resolved_settings(name: str, preset: str | None = None, **values: object) -> dict[str, Any]:
     """All settings of a matcher as plain values; raises as `open_matcher` does."""
-    return settings.to_dict(_settings(plugs.load("matchers", name), name, preset, values))
+    return settings.to_dict(_settings(name, preset, values))
 
 
-def _settings(module: ModuleType, name: str, preset: str | None, values: dict[str, object]) -> object:
-    if preset is not None and preset not in module.PRESETS:
-        known = ", ".join(sorted(module.PRESETS)) or "none"
-        raise SettingsError(f"the matcher '{name}' has no preset '{preset}': known are {known}")
-    base = module.PRESETS[preset] if preset is not None else None
-    return settings.make(module.Settings, values, base)
+def _settings(name: str, preset: str | None, values: dict[str, object]) -> object:
+    kind, presets = plugs.settings_of("matchers", name)
+    return settings.make(kind, values, settings.preset_of(f"the matcher '{name}'", presets, preset))

@@ -77,7 +77,7 @@ def reproduce(
     OutputError where another process writes `out`.
     """
     folder, chosen = Path(out), choice or Choice()
-    family = plugs.load("reproduction", name)
+    family = plugs.load("evplace_lab.reproduction", name)
     count = (os.cpu_count() or 1) if workers is None else workers
     _check(name, family, chosen, count)
     drives = _real_sets(data) if family.NEEDS == "data" else Cities(Path(city or folder / "city"), folder)
