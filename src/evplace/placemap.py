@@ -132,17 +132,17 @@ class PlaceMap:
 
     def require_same(self, query: Traverse) -> None:
         """PlaceMapError where a query's images were not made as this map's: they cannot be compared."""
+        if self.recipe is not None and query.recipe is not None:
+            self.recipe.require_same(
+                query.recipe, "the map", "the query", "make the query from its recording by `PlaceMap.open`, "
+                "which evplace localize and evaluate do by themselves",
+            )  # fmt: skip
         shape = query.images.shape[1:]
         if shape != self.image_shape:
             raise PlaceMapError(
                 f"the map was made from images of shape {self.image_shape}, the query's are {shape}: make "
                 "the query with the map's recipe (`PlaceMap.open`, or evplace evaluate on its recording)"
             )
-        if self.recipe is not None and query.recipe is not None:
-            self.recipe.require_same(
-                query.recipe, "the map", "the query", "make the query from its recording by `PlaceMap.open`, "
-                "which evplace localize and evaluate do by themselves",
-            )  # fmt: skip
 
     def save(self, path: str | Path, overwrite: bool = False) -> None:
         """Write the folder `path`; OutputError where it exists or cannot be written."""

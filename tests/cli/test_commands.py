@@ -13,6 +13,7 @@ import pytest
 
 from conftest import make_drive, write_drive
 from evplace.cli import commands, main
+from evplace.imaging.traverse import Traverse
 
 Capture = pytest.CaptureFixture[str]
 

@@ -84,7 +84,7 @@ def test_settings_files(folder: Path, capsys: Capture) -> None:
     toml.write_text("[windows\n")
     assert "is not TOML" in fault(capsys, *start)
     toml.write_text("[windows]\nlength = 3\n")
-    assert "unknown setting 'length'" in fault(capsys, *start)
+    assert "s.toml: unknown setting 'windows.length'" in fault(capsys, *start)
     toml.write_text("[colours]\n")
     assert "known are" in fault(capsys, *start)
 
@@ -97,7 +97,7 @@ def test_settings_files_of_the_wrong_kind(folder: Path, capsys: Capture) -> None
     toml.write_text("[images]\nblur = 3\n")
     assert "true or false" in fault(capsys, *start)
     toml.write_text("[images]\ntau_ms = nan\n")
-    assert "'tau_ms' cannot be nan" in fault(capsys, *start)
+    assert "s.toml: the setting 'images.tau_ms' cannot be nan" in fault(capsys, *start)
     assert "'tau_ms' cannot be nan" in fault(capsys, *start[:4], "--tau-ms", "nan")
     assert "cannot be nan" in fault(
         capsys, "train", folder / "day.aedat4", "--track", folder / "day.csv", "-o", folder / "m",

@@ -45,7 +45,7 @@ def test_the_command_of_the_manual(scores, tmp_path, capsys) -> None:
 def test_distances_and_no_answer(tmp_path, capsys) -> None:
     table = np.abs(np.arange(30)[:, None] - np.arange(30)[None]) * 5
     np.save(tmp_path / "d.npy", table)
-    run(Args(tmp_path / "d.npy", tmp_path / "m.csv", "seqslam", "openseqslam2", ("ds=5",), distances=True))
+    run(Args(tmp_path / "d.npy", tmp_path / "m.csv", "seqslam", "openseqslam2", (("ds", 5),), distances=True))
     references = [int(row["reference"]) for row in read(tmp_path / "m.csv")]
     assert references == [-1, -1, *range(2, 28), -1, -1]
     assert read(tmp_path / "m.csv")[0]["score"] == "nan"
@@ -95,4 +95,4 @@ def test_unknown_names_are_refused(scores, tmp_path) -> None:
     with pytest.raises(SettingsError, match="none of the matchers"):
         run(Args(scores, tmp_path / "m.csv", "fab-map"))
     with pytest.raises(SettingsError, match="unknown setting 'k'"):
-        run(Args(scores, tmp_path / "m.csv", "graph", None, ("k=5",)))
+        run(Args(scores, tmp_path / "m.csv", "graph", None, (("k", 5),)))

@@ -56,7 +56,9 @@ def test_a_drive_of_a_data_set(tmp_path: Path, capsys: Capture) -> None:
     facts = said(capsys, "images", tmp_path / "oxford", "--drive", DATE, "-o", out)
     assert facts["shape"] == [90, 160]
     assert facts["with_position"] > 0
-    assert (info_of(out)["input"], info_of(out)["windows"]["dt"]) == ("events", "1/16")
+    recipe = Traverse.load(out).recipe
+    assert recipe is not None
+    assert (recipe.kind, recipe.windows.dt) == ("events", "1/16")
     again = ("images", tmp_path / "oxford", "--overwrite", "-o", out)
     assert said(capsys, *again, "--kind", "frames", "--width", 40)["shape"] == [90, 40, 3]
     said(capsys, *again, "--dt", "1/30")

@@ -50,14 +50,8 @@ def test_an_unknown_key_lists_the_known() -> None:
         settings.make(Some, {"taus": 1})
 
 
-def test_pairs_and_dictionaries() -> None:
-    assert settings.from_pairs(["K=5", "kind=a", "wrap=true", "tau=1e-3"]) == {
-        "K": 5, "kind": "a", "wrap": True, "tau": 0.001,
-    }  # fmt: skip
+def test_dictionaries() -> None:
     assert settings.make(Some, settings.to_dict(Some(K=2))) == Some(K=2)
-    for wrong in ("K", "=5"):
-        with pytest.raises(SettingsError, match="name=value"):
-            settings.from_pairs([wrong])
 
 
 def test_files(tmp_path: Path) -> None:
@@ -76,3 +70,12 @@ def test_families_are_their_folders() -> None:
     assert families.load("tracks", "csv").__name__ == "evplace.sources.tracks.csv"
     with pytest.raises(SettingsError, match="known are cosine"):
         families.load("scorers", "_ncc")
+
+
+def test_a_preset_is_looked_up() -> None:
+    presets = {"paper": Some(K=7), "plain": Some()}
+    assert settings.preset_of("the part", presets, "paper") == Some(K=7)
+    assert settings.preset_of("the part", presets, None) is None
+    with pytest.raises(SettingsError, match="the part has no preset 'papers': known are paper, plain"):
+        settings.preset_of("the part", presets, "papers")
+    assert settings.changed(Some(K=7, tau=0.5)) == ["K"]

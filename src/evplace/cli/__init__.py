@@ -67,7 +67,13 @@ def _run(arguments: list[str]) -> int:
     module = importlib.import_module(_modules()[name])
     from evplace.cli._parse import parse
 
-    code: int = module.run(parse(module, name, arguments[1:]))
+    parsed = parse(module, name, arguments[1:])
+    if parsed.only_shown:
+        from evplace.cli._output import print_settings
+
+        print_settings(parsed.in_force(), parsed.args.json)
+        return 0
+    code: int = module.run(parsed.args)
     return code
 
 

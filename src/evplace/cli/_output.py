@@ -17,8 +17,8 @@ USED_GOOD_PART = 3
 
 
 def print_json(value: object) -> None:
-    """One JSON object on standard output; NaN becomes null, because JSON has none."""
-    print(json.dumps(_plain(value)))
+    """One JSON object on standard output; NaN becomes null, because JSON has none, and a path its text."""
+    print(json.dumps(_plain(value), default=str))
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
@@ -31,6 +31,15 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
     for row in rows:
         table.add_row(*[cell if isinstance(cell, str) else _text(cell) for cell in row])
     Console(width=None if sys.stdout.isatty() else 160).print(table)
+
+
+def print_settings(settings: Mapping[str, tuple[object, str]], as_json: bool) -> None:
+    """Settings with their values and where these came from, for people or as one JSON object."""
+    if as_json:
+        print_json({name: {"value": value, "from": source} for name, (value, source) in settings.items()})
+        return
+    rows = [(name, str(value), source) for name, (value, source) in settings.items()]
+    print_table("", ("setting", "value", "from"), rows)
 
 
 def print_facts(title: str, facts: Mapping[str, object]) -> None:

@@ -40,7 +40,9 @@ class Args:
 def run(args: Args) -> int:
     """Print one row a result."""
     if not args.results:
-        raise SettingsError("nothing to compare: give one or more result folders")
+        raise SettingsError(
+            "nothing to compare: give result folders, and give them first: --figures takes all words after it"
+        )
     rows = compare(args.results)
     if args.json:
         print_json({"results": rows})

@@ -13,13 +13,13 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
+from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
 from evplace.cli._track import TrackFlags
-from evplace.core import settings
 from evplace.core.errors import MissingExtraError, SettingsError
 from evplace.core.storage import check_new_folder
 from evplace.evaluation import MARK
@@ -42,6 +42,10 @@ SHOWN = (
 class Args(TrackFlags):
     """Flags of `evplace evaluate`."""
 
+    PARTS: ClassVar[tuple[Part, ...]] = (
+        *TrackFlags.PARTS, Part.of("matchers", "matcher", preset="preset"),
+    )  # fmt: skip
+
     map: tyro.conf.Positional[Path]
     """A map that `evplace train` wrote."""
     drive: tyro.conf.Positional[Path]
@@ -59,11 +63,11 @@ class Args(TrackFlags):
     """For --rule radius: metres that an answer may be away."""
     answers: Literal["live", "hindsight"] = "live"
     """live: what the camera would have known as it drove. hindsight: what is known once it has arrived."""
-    matcher: str = "local"
-    """best (global-max), local (Algorithm 1), seqslam, graph, dp or hmm."""
-    preset: str | None = None
-    """A preset of the matcher, for example paper."""
-    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    matcher: Annotated[str, a_part_of("matchers")] = "local"
+    """How score rows become answers; `evplace list matchers` says what each does."""
+    preset: Annotated[str | None, a_preset_of("matchers")] = None
+    """A preset of the matcher."""
+    set: Pairs = ()
     """A setting of the matcher, as name=value."""
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
@@ -89,8 +93,7 @@ def run(args: Args) -> int:
     if args.frames is not None and args.frames < 0:
         raise SettingsError(f"--frames is how many items off an answer may be, 0 or more, not {args.frames}")
     place_map = PlaceMap.load(args.map)
-    values = settings.from_pairs(args.set)
-    where = Localizer(place_map, args.matcher, args.preset, args.mask, **values)
+    where = Localizer(place_map, args.matcher, args.preset, args.mask, **dict(args.set))
     query = _opened(args, place_map)
     reference = Traverse.load(args.reference) if args.reference is not None else None
     truth = _truth(args, place_map, query)

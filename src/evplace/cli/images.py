@@ -64,8 +64,6 @@ class Args(TrackFlags):
     spacing: Annotated[SpacingSettings, tyro.conf.arg(name="")] = field(default_factory=SpacingSettings)
     mask: Path | None = None
     """Pixels to leave out: a text file of x,y lines, or a .npy file (a mask.npy of a traverse will do)."""
-    settings: Path | None = None
-    """A TOML file with any of these settings; windows, images, cleaning and spacing are its tables."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False

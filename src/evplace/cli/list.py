@@ -39,12 +39,11 @@ def run(args: Args) -> int:
         )
         return 0
     for family, found in parts.items():
-        print_facts(family, {name: _about(family, one) for name, one in found.items()})
+        print_facts(family, {name: _about(one) for name, one in found.items()})
     return 0
 
 
-def _about(family: str, one: families.Entry) -> str:
+def _about(one: families.Entry) -> str:
     if one.fault is not None:
         return one.fault
-    needs = f" Needs {families.load(family, one.name).NEEDS}." if family == "datasets" else ""
-    return f"{one.about}{needs}" + ("" if one.package == families.OURS else f" (from {one.package})")
+    return one.about if one.package == families.OURS else f"{one.about} (from {one.package})"

@@ -17,12 +17,12 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
-from evplace.core import settings
+from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.core.errors import DamagedRecordingError
 from evplace.core.storage import new_file
 from evplace.drives.to_traverse import open_source_for, recorded_as
@@ -38,18 +38,20 @@ COLUMNS = ("t_us", "place", "easting", "northing", "score", "state")
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(SettingsFlags):
     """Flags of `evplace localize`."""
+
+    PARTS: ClassVar[tuple[Part, ...]] = (Part.of("matchers", "matcher", preset="preset"),)
 
     map: tyro.conf.Positional[Path]
     """A map that `evplace train` wrote."""
     drive: tyro.conf.Positional[Path]
     """An event recording, a video, a folder of images, or a traverse folder."""
-    matcher: str = "local"
-    """best (global-max), local (Algorithm 1), seqslam, graph, dp or hmm."""
-    preset: str | None = None
-    """A preset of the matcher, for example paper."""
-    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    matcher: Annotated[str, a_part_of("matchers")] = "local"
+    """How score rows become answers; `evplace list matchers` says what each does."""
+    preset: Annotated[str | None, a_preset_of("matchers")] = None
+    """A preset of the matcher."""
+    set: Pairs = ()
     """A setting of the matcher, as name=value: K=5, tau1=0.99, tau2=0.01 for local."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Write a .csv file instead of standard output."""
@@ -109,8 +111,7 @@ class _Drive:
 
 def run(args: Args) -> int:
     """Localise and print, or write, the matches."""
-    values = settings.from_pairs(args.set)
-    where = Localizer(PlaceMap.load(args.map), args.matcher, args.preset, args.mask, **values)
+    where = Localizer(PlaceMap.load(args.map), args.matcher, args.preset, args.mask, **dict(args.set))
     matches = _Drive(where, args)
     if args.out is not None:
         with (

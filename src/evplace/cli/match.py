@@ -14,28 +14,30 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import tyro
 
-from evplace.core import settings
+from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.matchers import _files, open_matcher
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(SettingsFlags):
     """What `evplace match` can be told."""
+
+    PARTS: ClassVar[tuple[Part, ...]] = (Part.of("matchers", "matcher", preset="preset"),)
 
     scores: tyro.conf.Positional[Path]
     """A .npy file, (queries, references); larger is better, unless --distances."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The csv file to write."""
-    matcher: str = "local"
-    """best, local, seqslam, graph, dp or hmm."""
-    preset: str | None = None
-    """Named settings of the matcher, for example openseqslam2, openseqslam2013, opr, isl, ism or paper."""
-    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
-    """A setting over those of the preset, as name=value; may be given several times."""
+    matcher: Annotated[str, a_part_of("matchers")] = "local"
+    """How score rows become answers; `evplace list matchers` says what each does."""
+    preset: Annotated[str | None, a_preset_of("matchers")] = None
+    """A preset of the matcher."""
+    set: Pairs = ()
+    """A setting of the matcher over those of the preset, as name=value."""
     distances: bool = False
     """Smaller is better."""
     overwrite: bool = False
@@ -46,7 +48,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Match the whole matrix, a block of rows at a time; 0, or an EvplaceError."""
-    matcher = open_matcher(args.matcher, args.preset, args.distances, **settings.from_pairs(args.set))
+    matcher = open_matcher(args.matcher, args.preset, args.distances, **dict(args.set))
     table = _files.open_scores(args.scores)
     for rows in _files.score_blocks(table, args.distances):
         matcher.extend(rows)

@@ -14,11 +14,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json, remarks
+from evplace.cli._settings import Pairs, Part, SettingsFlags, a_preset_of
 from evplace.core import settings as settings_room
 from evplace.core.errors import DamagedRecordingError
 from evplace.core.events import Events
@@ -28,16 +29,20 @@ from evplace.sources.writers import write_recording
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(SettingsFlags):
     """Flags of `evplace simulate`."""
+
+    PARTS: ClassVar[tuple[Part, ...]] = (
+        Part("set", "preset", lambda _: ("the sensor", SensorSettings, PRESETS)),
+    )
 
     film: tyro.conf.Positional[Path]
     """A video file, or a folder of images."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The recording to write: .aedat4, .npz, .h5 or .raw (EVT3)."""
-    preset: Literal["ideal", "weak", "from-8bit"] = "from-8bit"
+    preset: Annotated[str, a_preset_of(PRESETS)] = "from-8bit"
     """The sensor; from-8bit is for gamma-coded frames, as videos are."""
-    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    set: Pairs = ()
     """A setting of the sensor over the preset's, as name=value: threshold_on=0.15."""
     fps: float = 30.0
     """Images a second of a folder without times."""
@@ -51,8 +56,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Simulate and write."""
-    values = settings_room.from_pairs(args.set)
-    sensor = settings_room.make(SensorSettings, values, PRESETS[args.preset])
+    sensor = settings_room.make(SensorSettings, dict(args.set), PRESETS[args.preset])
     film = open_film(args.film, args.fps)
     packets = _Counted(simulate(film, film.size, sensor, args.seed))
     fault = None

@@ -13,18 +13,20 @@ A run that was stopped goes on where it was when the same command is given again
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
 from evplace.cli._recipe import recipe_settings, spacing_given
+from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
 from evplace.cli._track import TrackFlags
 from evplace.core import families
-from evplace.core import settings as settings_room
 from evplace.core.errors import SettingsError, TraverseError
+from evplace.core.settings import make
 from evplace.core.storage import check_new_folder
 from evplace.drives.to_traverse import open_traverse
 from evplace.imaging.images import ImageSettings
@@ -42,6 +44,9 @@ from evplace.sources.cleaning import CleaningSettings
 class Args(TrackFlags):
     """Flags of `evplace train`."""
 
+    PARTS: ClassVar[tuple[Part, ...]] = (*TrackFlags.PARTS, Part.of("scorers", "scorer", preset="preset"))
+    TABLE_PRESETS: ClassVar[Mapping[str, Mapping[str, Any]]] = {"train": TrainSettings.presets}
+
     drive: tyro.conf.Positional[Path]
     """The drive to learn: an event recording, a folder of images, or a traverse folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
@@ -52,12 +57,12 @@ class Args(TrackFlags):
     """Without GPS: how many images make a place."""
     tolerance: int = 0
     """Without GPS: how many places off an answer may be."""
-    scorer: str = "network"
-    """network, sad or ncc."""
-    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    scorer: Annotated[str, a_part_of("scorers")] = "network"
+    """What compares images with the map; `evplace list scorers` says what each does."""
+    set: Pairs = ()
     """A setting of the scorer, as name=value."""
-    preset: Literal["paper", "notebook"] | None = None
-    """paper: as printed; notebook: as the author's published notebook does."""
+    preset: Annotated[str | None, a_preset_of("scorers")] = None
+    """A preset of the scorer. paper: trained as printed; notebook: as the author's notebook does."""
     train: Annotated[TrainSettings, tyro.conf.arg(name="")] = field(default_factory=TrainSettings)
     windows: Annotated[WindowSettings, tyro.conf.arg(name="")] = field(default_factory=WindowSettings)
     images: Annotated[ImageSettings, tyro.conf.arg(name="")] = field(default_factory=ImageSettings)
@@ -65,8 +70,6 @@ class Args(TrackFlags):
     spacing: Annotated[SpacingSettings, tyro.conf.arg(name="")] = field(default_factory=SpacingSettings)
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
-    settings: Path | None = None
-    """A TOML file with any of these settings; train, windows, images, cleaning and spacing are its tables."""
     size: tuple[int, int] | None = None
     """Width and height of the sensor in pixels, where the file does not say."""
     time_unit: Literal["s", "ms", "us", "ns"] | None = None
@@ -129,10 +132,10 @@ def _places(args: Args, reference: Traverse) -> Places:
 
 def _scorer(args: Args) -> Scorer | Descriptor:
     """The scorer with its settings: for one that is trained by these flags, those of the training."""
-    values = settings_room.from_pairs(args.set)
-    trained = {name: getattr(args.train, name) for name in vars(args.train) if name in args.given}
-    if args.scorer != "network" and trained:
-        flag = next(iter(trained)).replace("_", "-")
-        raise SettingsError(f"--{flag} means nothing for the scorer '{args.scorer}': leave it out")
-    part: Scorer | Descriptor = families.make("scorers", args.scorer, args.preset, {**trained, **values})
+    if args.scorer == "network":
+        return make(TrainSettings, dict(args.set), args.train)
+    trained = [name for name in vars(args.train) if name in args.given]
+    if trained:
+        raise SettingsError(f"'{trained[0]}' means nothing for the scorer '{args.scorer}': leave it out")
+    part: Scorer | Descriptor = families.make("scorers", args.scorer, args.preset, dict(args.set))
     return part

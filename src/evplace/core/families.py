@@ -97,17 +97,17 @@ def make(family: str, given: object, preset: str | None = None, values: Mapping[
                 f"settings beside the object {given!r}: put them into the object, or give its name"
             )
         return given
-    kind = load(family, given)
-    base = None
-    if preset is not None:
-        presets: Mapping[str, object] = getattr(kind, "presets", {})
-        if preset not in presets:
-            known = ", ".join(sorted(presets)) or "none"
-            raise SettingsError(
-                f"the {family.removesuffix('s')} '{given}' has no preset '{preset}': known are {known}"
-            )
-        base = presets[preset]
+    kind, presets = settings_of(family, given)
+    base = settings.preset_of(f"the {family.removesuffix('s')} '{given}'", presets, preset)
     return settings.make(kind, values, base)
+
+
+def settings_of(family: str, name: str) -> tuple[type[Any], Mapping[str, Any]]:
+    """The settings of a part, a dataclass, and its presets; SettingsError as `load`."""
+    part = load(family, name)
+    if family in CLASSES:
+        return part, getattr(part, "presets", {})
+    return part.Settings, getattr(part, "PRESETS", {})
 
 
 def name_of(family: str, part: object) -> str:
@@ -201,4 +201,6 @@ def _entry(family: str, name: str) -> Entry:
         return Entry(name, package, "", str(error))
     # A class's own description is of its settings; that of its file says what the part is.
     about = inspect.getmodule(part) if family in CLASSES and other is None else part
-    return Entry(name, package, (inspect.getdoc(about) or "").split("\n\n")[0].replace("\n", " "))
+    summary = (inspect.getdoc(about) or "").split("\n\n")[0].replace("\n", " ")
+    needs = f" Needs {part.NEEDS}." if family == "datasets" else ""
+    return Entry(name, package, summary + needs)

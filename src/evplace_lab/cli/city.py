@@ -19,12 +19,13 @@ from typing import Annotated
 import tyro
 
 from evplace.cli._output import print_json, progress
+from evplace.cli._settings import SettingsFlags
 from evplace.core.errors import SettingsError
 from evplace_lab.city import CitySettings, generate, moving_preview, preview
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(SettingsFlags):
     """Flags of `evplace city`."""
 
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
@@ -32,8 +33,6 @@ class Args:
     preview: Path | None = None
     """Only write a picture: a contact sheet (.png), or a short drive (.webp, .gif)."""
     city: Annotated[CitySettings, tyro.conf.arg(name="")] = field(default_factory=CitySettings)
-    settings: Path | None = None
-    """A TOML file with any of these settings, in a table city."""
     workers: int | None = None
     """Processes; one a core if not given. They do not change the result."""
     json: bool = False

@@ -21,7 +21,8 @@ from typing import Annotated
 import tyro
 
 from evplace.cli._output import print_json, print_table, progress
-from evplace.core import families, settings
+from evplace.cli._settings import Pairs, a_part_of
+from evplace.core import families
 from evplace_lab.reproduction import Choice, reproduce
 
 
@@ -29,8 +30,8 @@ from evplace_lab.reproduction import Choice, reproduce
 class Args:
     """Flags of `evplace reproduce`."""
 
-    name: tyro.conf.Positional[str]
-    """table2, figure5, ablations or real."""
+    name: Annotated[tyro.conf.Positional[str], a_part_of("reproduction")]
+    """What to make."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The folder for the results; what is there is gone on with."""
     city: Path | None = None
@@ -41,7 +42,7 @@ class Args:
     """Trainings of each network."""
     inputs: tuple[str, ...] = ()
     """For table2 and figure5: only these inputs, for example events colour; all if not given."""
-    set: tyro.conf.UseAppendAction[tuple[str, ...]] = ()
+    set: Pairs = ()
     """A setting of all trainings over the recipes', as name=value: for a quick look."""
     workers: int | None = None
     """Processes; one a core if not given. They do not change the result."""
@@ -51,7 +52,7 @@ class Args:
 
 def run(args: Args) -> int:
     """Run what is missing, print the tables."""
-    choice = Choice(args.seeds, settings.from_pairs(args.set), args.inputs)
+    choice = Choice(args.seeds, dict(args.set), args.inputs)
     with progress(args.name) as show:
         document = reproduce(args.name, args.out, args.city, args.data, choice, args.workers, show)
     if args.json:

@@ -8,14 +8,13 @@ One file a format, found by content. Each file holds `Settings`, a frozen datacl
 from __future__ import annotations
 
 from pathlib import Path
-from types import ModuleType
 
 from evplace.core import families, settings
-from evplace.core.errors import SettingsError, TrackError
+from evplace.core.errors import TrackError
 from evplace.sources.tracks._fixes import Fixes
 from evplace.sources.tracks._track import Track
 
-__all__ = ["Fixes", "Track", "open_track"]
+__all__ = ["Fixes", "Track", "format_of", "open_track"]
 
 _HEAD_BYTES = 65536
 
@@ -38,17 +37,18 @@ def open_track(
     Raises TrackError where the file cannot be read or holds no usable fix, SettingsError for a setting.
     """
     path = Path(path)
-    part = _format_of(path)
-    chosen = settings.make(part.Settings, values, _preset(part, preset))
+    name = format_of(path)
+    kind, presets = families.settings_of("tracks", name)
+    chosen = settings.make(kind, values, settings.preset_of(f"the track format '{name}'", presets, preset))
     try:
-        fixes: Fixes = part.read(path, chosen)
+        fixes: Fixes = families.load("tracks", name).read(path, chosen)
         return Track.of(fixes, offset_us, zone, northern)
     except TrackError as error:
         raise TrackError(f"{path}: {error}") from error
 
 
-def _format_of(path: Path) -> ModuleType:
-    """The part that reads this file, by the file's first bytes."""
+def format_of(path: Path) -> str:
+    """The name of the format of a GPS log, by the file's first bytes; TrackError where none is known."""
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES)
@@ -58,17 +58,6 @@ def _format_of(path: Path) -> ModuleType:
         raise TrackError(f"{path} is empty: give a GPS log with fixes in it")
     known = families.names("tracks")
     for name in known:
-        part: ModuleType = families.load("tracks", name)
-        if part.recognises(head):
-            return part
+        if families.load("tracks", name).recognises(head):
+            return name
     raise TrackError(f"{path} is no GPS log that is known here: give one of {', '.join(known)}")
-
-
-def _preset(part: ModuleType, name: str | None) -> object | None:
-    if name is None:
-        return None
-    if name not in part.PRESETS:
-        known = ", ".join(sorted(part.PRESETS)) or "none"
-        raise SettingsError(f"'{name}' is no preset of {part.__name__}: known are {known}")
-    preset: object = part.PRESETS[name]
-    return preset
