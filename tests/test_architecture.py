@@ -13,7 +13,7 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": "core sources imaging drives places placemap scorers matchers localizer evaluation doctor cli",
-    "evplace.core": "errors events families settings storage workers",
+    "evplace.core": "errors events grey families settings storage workers drawing",
     "evplace.sources": "frames readers writers cleaning tracks film simulators",
     "evplace.imaging": "windows resampling representations tones images stream spacing traverse sheets",
     "evplace.drives": "datasets to_traverse",
