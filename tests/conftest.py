@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from evplace.core.events import Events
 from evplace.imaging.recipe import Recipe
@@ -19,8 +19,14 @@ from evplace.places import PlaceGrid
 from evplace.sources.tracks import Track
 from evplace.sources.writers import write_recording
 
-settings.register_profile("evplace", deadline=None)  # the first call of a numba loop compiles it
+# The first call of a numba loop compiles it, and nothing here may depend on how busy the machine is.
+settings.register_profile("evplace", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("evplace")
+
+
+HANG_S = 600
+"""Seconds after which a process that a test waits for is taken to hang. No test waits for the clock: each
+waits for what is to happen, however long a busy machine takes to do it."""
 
 
 @pytest.fixture(scope="session")

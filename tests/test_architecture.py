@@ -15,7 +15,7 @@ ORDER = {
     "evplace": (
         "core sources imaging drives places scorers placemap matchers localizer evaluation doctor cli"
     ),
-    "evplace.core": "errors events settings families storage workers",
+    "evplace.core": "errors events grey settings families storage workers drawing",
     "evplace.sources": "frames readers writers cleaning tracks film simulators",
     "evplace.imaging": (
         "windows resampling representations tones images recipe stream spacing traverse sheets"

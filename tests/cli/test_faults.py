@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import errno
-import functools
-import importlib.util
 import json
 import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from conftest import make_drive, write_drive
+from conftest import HANG_S, make_drive, write_drive
 from evplace.cli import main
 from evplace.core import storage
 from evplace.core.events import Events
@@ -320,7 +316,7 @@ def test_a_sheet_that_exists_is_told_before_the_work(folder: Path, capsys: Captu
 def test_a_report_without_matplotlib_is_told_before_the_work(
     folder: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     # The recording does not exist: what is missing is said before it is looked at.
     assert "matplotlib" in fault(capsys, "doctor", folder / "none.aedat4", "--report", folder / "x")
 
@@ -346,12 +342,24 @@ def test_a_second_writer(folder: Path, capsys: Capture) -> None:
     assert "another process" in run.stderr
 
 
-def until(condition: Callable[[], bool]) -> None:
-    for _ in range(1200):
-        if condition():
-            return
-        time.sleep(0.05)
-    raise AssertionError("it did not happen within a minute")
+WAITS_ONCE_SAVED = """
+import signal, sys
+from evplace.cli import main
+from evplace.scorers._network import checkpoint
+
+def keep(self, *state):
+    save(self, *state)
+    if self._path.exists():
+        print("saved", flush=True)
+        sys.stdin.read()
+
+checkpoint.EVERY = 20
+save, checkpoint.Checkpoint.keep = checkpoint.Checkpoint.keep, keep
+# A shell's background jobs, and tests among them, are born deaf to SIGINT.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.exit(main(sys.argv[1:]))
+"""
+"""A command that says when a checkpoint was written, and waits then to be stopped."""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to one process")
@@ -359,21 +367,20 @@ def until(condition: Callable[[], bool]) -> None:
 def test_a_training_that_was_stopped_goes_on(folder: Path, how: signal.Signals) -> None:
     pytest.importorskip("torch", reason="the network needs the extra 'train'")
     day = ["train", folder / "day.aedat4", "--track", folder / "day.csv", "--batch", "8"]
-    command = [sys.executable, "-m", "evplace", *map(str, [*day, "--steps", "400"])]
-    # A shell's background jobs, this test among them, are born deaf to SIGINT.
-    hears = functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
-    process = subprocess.Popen(
-        [*command, "-o", folder / "stopped"], stderr=subprocess.PIPE, text=True, preexec_fn=hears
-    )
-    until((folder / ".stopped.checkpoint").exists)
-    process.send_signal(how)
-    _, told = process.communicate(timeout=60)
+    command = [*map(str, [*day, "--steps", "60"]), "-o"]
+    waiting, pipe = [sys.executable, "-c", WAITS_ONCE_SAVED, *command, folder / "stopped"], subprocess.PIPE
+    with subprocess.Popen(waiting, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "saved\n"
+        process.send_signal(how)
+        _, told = process.communicate(timeout=HANG_S)
     if how == signal.SIGINT:
         assert process.returncode == 130
         assert told.splitlines() == ["evplace: interrupted; nothing half-written was left"]
     assert not (folder / "stopped").exists()
     for name in ("stopped", "whole"):
-        subprocess.run([*command, "-o", folder / name], check=True, capture_output=True)
+        again = [sys.executable, "-m", "evplace", *command, folder / name]
+        subprocess.run(again, check=True, capture_output=True)
     stopped, whole = ((folder / name / "network.onnx").read_bytes() for name in ("stopped", "whole"))
     assert stopped == whole
     assert not (folder / ".stopped.checkpoint").exists()

@@ -1,12 +1,14 @@
-"""Long work in processes of its own, several at a time: `python -m MODULE`, one process a job.
+"""Work in processes of its own: `python -m MODULE`, which imports what its caller does.
 
 Not multiprocessing: that would run the caller's own script again in each process. The job comes on standard
-input, as JSON. A worker prints lines, each told to the caller at once; an error that evplace raises on
-purpose travels back as such; a worker whose caller has gone ends.
+input, as a line of JSON; an error that evplace raises on purpose travels back as such; a process whose caller
+has gone ends. `start` and `received` are the two ends of any such process. `run_all` and `serve` are those of
+long work, several processes at a time, which prints lines that its caller gets at once.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -17,18 +19,50 @@ from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
-import evplace
 from evplace.core import errors
 from evplace.core.errors import EvplaceError, OutputError
 
 Job = Mapping[str, Any]
-"""What a worker is to do, as JSON has it."""
+"""What a process is to do, as JSON has it."""
 
 _ERROR = "error "
 
 
+def start(module: str, job: Job, **how: Any) -> subprocess.Popen[bytes]:
+    """A process that does `job`: `python -m module`, whose standard output is a pipe; `how` is for Popen.
+
+    Its standard input stays open as long as the caller lives. It does not look for modules in the current
+    folder, whose files may be called like any of them, unless the caller does.
+    """
+    command, pipe = [sys.executable, "-P", "-m", module], subprocess.PIPE
+    process = subprocess.Popen(command, stdin=pipe, stdout=pipe, env=_environment(), **how)
+    assert process.stdin is not None
+    with contextlib.suppress(BrokenPipeError):  # it has ended already: its exit code says so
+        process.stdin.write(json.dumps(job).encode() + b"\n")
+        process.stdin.flush()
+    return process
+
+
+def received() -> dict[str, Any]:
+    """The job, in the process that does it; from now on this ends with its caller."""
+    job: dict[str, Any] = json.loads(sys.stdin.buffer.readline())
+    Thread(target=_end_with_the_caller, daemon=True).start()
+    return job
+
+
+def packed(error: EvplaceError) -> dict[str, str]:
+    """An error as JSON has it."""
+    return {"error": type(error).__name__, "text": str(error)}
+
+
+def unpacked(values: Mapping[str, str]) -> EvplaceError:
+    """The error that was packed, of its own kind."""
+    kind: type[EvplaceError] = getattr(errors, values["error"], EvplaceError)
+    return kind.__new__(kind, values["text"])  # past an __init__ that would build the text again
+
+
 def run_all(module: str, jobs: Sequence[Job], count: int, tell: Callable[[int, str], None]) -> None:
-    """Run `python -m module` for each of `jobs`, `count` at a time, in their order.
+    """Do all `jobs` in processes of `module`, which calls `serve`, `count` at a time, in their order.
 
     `tell` gets the job's index and each line that it prints, one call at a time. The first error ends all:
     the worker's own, or OutputError for one that was stopped.
@@ -36,11 +70,11 @@ def run_all(module: str, jobs: Sequence[Job], count: int, tell: Callable[[int, s
     running, alone = _Running(), Lock()
 
     def work(index: int) -> None:
-        def said(line: str) -> None:
+        def tell_alone(line: str) -> None:
             with alone:
                 tell(index, line)
 
-        _run(module, jobs[index], running, said)
+        _run(module, jobs[index], running, tell_alone)
 
     with ThreadPoolExecutor(max(1, count)) as pool:
         parts = [pool.submit(work, index) for index in range(len(jobs))]
@@ -55,26 +89,25 @@ def run_all(module: str, jobs: Sequence[Job], count: int, tell: Callable[[int, s
 
 def serve(work: Callable[[dict[str, Any], Callable[[str], None]], None]) -> int:
     """A worker's main: call `work` with the job and with what prints a line; returns the exit code."""
-    job = json.loads(sys.stdin.readline())
-    Thread(target=_end_with_the_caller, daemon=True).start()
+    job = received()
     try:
         work(job, lambda line: print(line, flush=True))
     except EvplaceError as error:
-        print(_ERROR + json.dumps({"kind": type(error).__name__, "text": str(error)}), flush=True)
+        print(_ERROR + json.dumps(packed(error)), flush=True)
         return 2
     return 0
 
 
-def environment() -> dict[str, str]:
-    """A worker imports the same evplace as its caller."""
-    source = str(Path(evplace.__file__).parents[1])
-    before = os.environ.get("PYTHONPATH")
-    return {**os.environ, "PYTHONPATH": source + (os.pathsep + before if before else "")}
+def _environment() -> dict[str, str]:
+    """The variables of a process that finds every module where its caller finds it, and prints UTF-8."""
+    folders = os.pathsep.join(folder or str(Path.cwd()) for folder in sys.path)
+    return {**os.environ, "PYTHONPATH": folders, "PYTHONIOENCODING": "utf-8"}
 
 
 def _end_with_the_caller() -> None:
-    """Standard input stays open as long as the caller lives."""
-    sys.stdin.read()
+    """Standard input stays open as long as the caller lives; read as a file, whose lock nobody else needs."""
+    while os.read(sys.stdin.fileno(), 1 << 10):
+        pass
     os._exit(1)
 
 
@@ -83,9 +116,9 @@ class _Running:
 
     def __init__(self) -> None:
         self._lock, self._ended = Lock(), False
-        self._processes: list[subprocess.Popen[str]] = []
+        self._processes: list[subprocess.Popen[bytes]] = []
 
-    def add(self, process: subprocess.Popen[str]) -> None:
+    def add(self, process: subprocess.Popen[bytes]) -> None:
         """Take one more; one that comes after the end is ended at once."""
         with self._lock:
             self._processes.append(process)
@@ -101,31 +134,16 @@ class _Running:
 
 
 def _run(module: str, job: Job, running: _Running, tell: Callable[[str], None]) -> None:
-    command = [sys.executable, "-m", module]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment()) as process:
+    with start(module, job) as process:
         running.add(process)
-        assert process.stdin is not None
         assert process.stdout is not None
-        process.stdin.write(json.dumps(job) + "\n")
-        process.stdin.flush()
-        for line in process.stdout:
+        for data in process.stdout:
+            line = data.decode()
             if line.startswith(_ERROR):
-                raise _error(line.removeprefix(_ERROR))
+                raise unpacked(json.loads(line.removeprefix(_ERROR)))
             tell(line.strip())
         code = process.wait()
     if code < 0:
         raise OutputError(f"a worker was stopped by signal {-code}: run again to go on")
     if code > 0:
         raise OutputError(f"a worker failed with exit code {code}: what it printed above says why")
-
-
-def _error(line: str) -> EvplaceError:
-    """The error that a worker met, of its own kind where this can be made from its text."""
-    told = json.loads(line)
-    kind = getattr(errors, told["kind"], EvplaceError)
-    try:
-        error: EvplaceError = kind(told["text"])
-    except TypeError:  # one that is made from other things than its text
-        return EvplaceError(told["text"])
-    return error

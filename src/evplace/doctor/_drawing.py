@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from evplace.core.errors import MissingExtraError
+from evplace.core import drawing
 from evplace.core.storage import check_new_folder, new_folder, write_json
 from evplace.doctor._outcome import Curve, Examination, Map
 
@@ -20,8 +19,7 @@ INK, SHADE, MARK = "#1b6ca8", "#efb998", "#c4622d"
 
 def check_drawing(folder: str | Path, overwrite: bool = False) -> None:
     """Raises what `draw` would raise: for saying so before an examination, which may take minutes."""
-    if importlib.util.find_spec("matplotlib") is None:
-        raise MissingExtraError("matplotlib", "report", "drawing an examination")
+    drawing.check_drawing()
     check_new_folder(folder, overwrite, FINDINGS)
 
 
@@ -31,18 +29,16 @@ def draw(examination: Examination, folder: str | Path, overwrite: bool = False) 
     MissingExtraError without matplotlib; OutputError where the folder exists and is not to be replaced.
     """
     check_drawing(folder, overwrite)
-    from matplotlib.figure import Figure
-
     with new_folder(folder, overwrite, FINDINGS) as partial:
         write_json(partial / FINDINGS, as_json(examination))
-        for drawing in examination.drawings:
-            figure = Figure(figsize=(9, 4.5), layout="constrained")
-            axes = figure.add_subplot(title=drawing.title)
-            if isinstance(drawing, Curve):
-                _curve(axes, drawing)
+        for drawn in examination.drawings:
+            figure = drawing.new_figure(9, 4.5)
+            axes = figure.add_subplot(title=drawn.title)
+            if isinstance(drawn, Curve):
+                _curve(axes, drawn)
             else:
-                _map(figure, axes, drawing)
-            figure.savefig(partial / f"{drawing.name}.png", dpi=120)
+                _map(figure, axes, drawn)
+            drawing.save(figure, partial / f"{drawn.name}.png")
 
 
 def as_json(examination: Examination) -> dict[str, Any]:
@@ -67,16 +63,15 @@ def _curve(axes: Any, curve: Curve) -> None:
         handles, labels = axes.get_legend_handles_labels()
         axes.legend(handles[:1], labels[:1], frameon=False)
     axes.set(xlabel=curve.across, ylabel=curve.up)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
-def _map(figure: Any, axes: Any, drawing: Map) -> None:
-    rows, columns = drawing.values.shape
-    side = drawing.pixels
-    shown = axes.imshow(
-        drawing.values, cmap="viridis", interpolation="nearest", vmin=0, vmax=drawing.top,
+def _map(figure: Any, axes: Any, shown: Map) -> None:
+    rows, columns = shown.values.shape
+    side = shown.pixels
+    image = axes.imshow(
+        shown.values, cmap="viridis", interpolation="nearest", vmin=0, vmax=shown.top,
         extent=(-0.5, columns * side - 0.5, rows * side - 0.5, -0.5),
     )  # fmt: skip
-    axes.plot(*drawing.marks.T, "o", markerfacecolor="none", markeredgecolor=MARK, markersize=7)
+    axes.plot(*shown.marks.T, "o", markerfacecolor="none", markeredgecolor=MARK, markersize=7)
     axes.set(xlabel="column", ylabel="row")
-    figure.colorbar(shown, label=drawing.label)
+    figure.colorbar(image, label=shown.label)

@@ -146,6 +146,16 @@ class Subject:
         self.parts += parts
 
 
+class AtTheEnd:
+    """An examination that asks its subject once all of it was seen."""
+
+    def __init__(self, subject: Subject) -> None:
+        self._subject = subject
+
+    def see(self, part: object) -> None:
+        """Nothing: the subject itself measures."""
+
+
 def mean_around(values: NDArray[Any], reach: int) -> NDArray[np.float64]:
     """(n,) mean of each value and up to `reach` before and after it."""
     sums = np.concatenate([[0.0], np.cumsum(values, dtype=np.float64)])

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from evplace.core.events import Events
 from evplace.doctor._outcome import Finding, Outcome, State, counted
 from evplace.doctor._silences import LEAP_US
-from evplace.doctor._subject import Subject
+from evplace.doctor._subject import AtTheEnd
 
 OF = ("events",)
 
@@ -13,14 +12,8 @@ MUCH = 0.05
 """Share of the recording above which gaps are bad."""
 
 
-class Check:
+class Check(AtTheEnd):
     """Asks the subject."""
-
-    def __init__(self, subject: Subject) -> None:
-        self._subject = subject
-
-    def see(self, events: Events) -> None:
-        """Nothing: the subject notes silences."""
 
     def outcome(self) -> Outcome:
         """Finding: gaps; value: their sum in seconds."""

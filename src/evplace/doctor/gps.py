@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.doctor._outcome import Finding, Outcome, State, counted
-from evplace.doctor._subject import Subject, mean_around
+from evplace.doctor._subject import AtTheEnd, Subject, mean_around
 from evplace.sources.tracks import Track
 
 OF = ("events", "frames")
@@ -17,14 +17,8 @@ AROUND = 5
 """Steps before and after by which a step is judged."""
 
 
-class Check:
+class Check(AtTheEnd):
     """Asks the track."""
-
-    def __init__(self, subject: Subject) -> None:
-        self._subject = subject
-
-    def see(self, part: object) -> None:
-        """Nothing: the track was read before."""
 
     def outcome(self) -> Outcome:
         """Findings: GPS fixes, quality, gaps, jumps, coverage; none without a track."""

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from evplace.core.events import Events
 from evplace.doctor._outcome import Finding, Map, Outcome, State
-from evplace.doctor._subject import Subject
+from evplace.doctor._subject import AtTheEnd
 from evplace.sources.cleaning import hot_pixels
 
 OF = ("events",)
 
 
-class Check:
+class Check(AtTheEnd):
     """Asks the counts of the whole file."""
-
-    def __init__(self, subject: Subject) -> None:
-        self._subject = subject
-
-    def see(self, events: Events) -> None:
-        """Nothing: the subject counts."""
 
     def outcome(self) -> Outcome:
         """Finding: hot pixels, by their share of the events; a map of the counts with them circled."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from evplace.doctor._outcome import Curve, Finding, Outcome, State
 from evplace.doctor._speed import speed_at, speeds, turning_at
-from evplace.doctor._subject import BIN_US, Subject
+from evplace.doctor._subject import BIN_US, AtTheEnd
 from evplace.sources.tracks import Track
 
 OF = ("events", "frames")
@@ -64,14 +64,8 @@ class Offset:
         return self.seconds - self.uncertainty_s, self.seconds + self.uncertainty_s
 
 
-class Check:
+class Check(AtTheEnd):
     """Asks the subject's activity and its track."""
-
-    def __init__(self, subject: Subject) -> None:
-        self._subject = subject
-
-    def see(self, part: object) -> None:
-        """Nothing: the subject counts."""
 
     def outcome(self) -> Outcome:
         """Finding: clock offset, and the fit over the shifts as a curve; none without a track."""

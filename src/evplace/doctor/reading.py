@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from evplace.doctor._outcome import Finding, Outcome, State
-from evplace.doctor._subject import Subject
+from evplace.doctor._subject import AtTheEnd
 
 OF = ("events", "frames")
 
@@ -11,14 +11,8 @@ CLOCKS_BITS = (16, 24, 28, 30, 31, 32, 34)
 """Widths of clocks that cameras and files have, in bits of microseconds."""
 
 
-class Check:
+class Check(AtTheEnd):
     """Asks the recording itself, once all of it was read."""
-
-    def __init__(self, subject: Subject) -> None:
-        self._subject = subject
-
-    def see(self, part: object) -> None:
-        """Nothing: the recording keeps count."""
 
     def outcome(self) -> Outcome:
         """Findings: reading; for a recording also remarks, the reasons for drops, clock."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evplace.doctor._outcome import Curve, Finding, Outcome, State, counted
 from evplace.doctor._speed import speed_at
-from evplace.doctor._subject import BIN_US, Subject, stretches
+from evplace.doctor._subject import BIN_US, AtTheEnd, Subject, stretches
 
 OF = ("events", "frames")
 
@@ -27,14 +27,8 @@ MUCH = 5.0
 """Per cent of the time above which stands should be thinned out."""
 
 
-class Check:
+class Check(AtTheEnd):
     """Asks the subject's activity, and its track."""
-
-    def __init__(self, subject: Subject) -> None:
-        self._subject = subject
-
-    def see(self, part: object) -> None:
-        """Nothing: the subject counts."""
 
     def outcome(self) -> Outcome:
         """Findings: quiet stretches, and stand-still where a track covers the recording."""

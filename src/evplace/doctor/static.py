@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from evplace.core.events import Events
 from evplace.doctor._outcome import Finding, Map, Outcome
-from evplace.doctor._subject import Subject
+from evplace.doctor._subject import AtTheEnd
 from evplace.sources.cleaning import static_pixels
 
 OF = ("events",)
@@ -20,14 +19,8 @@ BLOCK = 0.8
 """Share of static pixels in the rectangle around all of them that makes it one block."""
 
 
-class Check:
+class Check(AtTheEnd):
     """Asks the counts of the whole file."""
-
-    def __init__(self, subject: Subject) -> None:
-        self._subject = subject
-
-    def see(self, events: Events) -> None:
-        """Nothing: the subject counts."""
 
     def outcome(self) -> Outcome:
         """Finding: static regions, by their share of the sensor."""

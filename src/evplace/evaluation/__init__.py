@@ -47,6 +47,7 @@ __all__ = [
     "Samples",
     "average_precision",
     "compare",
+    "flat",
     "gallery_spacing",
     "hits_at",
     "measure",
@@ -111,12 +112,12 @@ def compare(results: Iterable[Result | str | Path]) -> list[dict[str, Any]]:
     Folders are read, nothing is run again. Nested settings are named as in `truth.cell_m`.
     """
     named = [_named(result, number) for number, result in enumerate(results, 1)]
-    settings = [_flat(result.settings) for _, result in named]
+    settings = [flat(result.settings) for _, result in named]
     keys = list(dict.fromkeys(key for one in settings for key in one))
     differing = [key for key in keys if any(one.get(key) != settings[0].get(key) for one in settings)]
     return [
         {"result": name, "answers": result.timing}
-        | _flat(result.figures)
+        | flat(result.figures)
         | {key: one.get(key) for key in differing}
         for (name, result), one in zip(named, settings, strict=True)
     ]
@@ -205,9 +206,9 @@ def _named(result: Result | str | Path, number: int) -> tuple[str, Result]:
     return Path(result).name, Result.load(result)
 
 
-def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Nested mappings as one, with dots in the names."""
-    flat: dict[str, Any] = {}
+    found: dict[str, Any] = {}
     for key, value in values.items():
-        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
-    return flat
+        found |= flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
+    return found

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import MissingExtraError
-from evplace.core.storage import new_file
+from evplace.core.drawing import new_figure, save
 from evplace.evaluation import OUTCOMES, Result
 
 Curve = tuple[str, NDArray[np.float64], int, str]
@@ -53,7 +52,7 @@ def accuracy_chart(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
     queries = list(dict.fromkeys(row["query"] for row in rows))
     kinds = list(dict.fromkeys((row["input"], row["matcher"]) for row in rows))
     width = 0.8 / len(kinds)
-    figure = _new_figure(9, 4)
+    figure = new_figure(9, 4)
     axes = figure.add_subplot(ylabel="accuracy in %", ylim=(0, 100))
     for place, (kind, matcher) in enumerate(kinds):
         shade = [other for name, other in kinds if name == kind].index(matcher)
@@ -68,7 +67,7 @@ def accuracy_chart(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
     axes.set_xticks(range(len(queries)), queries)
     axes.set_title("The map is day-1; the query as named")
     axes.legend(frameon=False, ncols=2)
-    _save(figure, path)
+    save(figure, path)
 
 
 def bars_chart(groups: Mapping[str, Sequence[Mapping[str, Any]]], path: str | Path) -> None:
@@ -78,7 +77,7 @@ def bars_chart(groups: Mapping[str, Sequence[Mapping[str, Any]]], path: str | Pa
     Raises MissingExtraError without matplotlib.
     """
     labels = list(dict.fromkeys(row["label"] for rows in groups.values() for row in rows))
-    figure = _new_figure(10, 3.2 * -(-len(groups) // 2))
+    figure = new_figure(10, 3.2 * -(-len(groups) // 2))
     all_axes = figure.subplots(-(-len(groups) // 2), min(2, len(groups)), squeeze=False, sharey=True)
     for axes in all_axes.flat[len(groups) :]:
         axes.set_visible(False)
@@ -93,13 +92,12 @@ def bars_chart(groups: Mapping[str, Sequence[Mapping[str, Any]]], path: str | Pa
                 axes.plot([at - width / 2, at + width / 2], [row["paper"]] * 2, color="black", linewidth=2)
         axes.set(title=title, ylim=(0, 100), ylabel="accuracy in %")
         axes.set_xticks(range(len(queries)), queries)
-        axes.spines[["top", "right"]].set_visible(False)
     for kind, label in enumerate(labels):
         all_axes[0, 0].bar([0], [0], color=PALETTE[kind % len(PALETTE)], label=label)
     if any(row["paper"] is not None for rows in groups.values() for row in rows):
         all_axes[0, 0].plot([], [], color="black", linewidth=2, label="the paper's")
     figure.legend(loc="outside lower center", ncols=min(len(labels) + 1, 4), frameon=False)
-    _save(figure, path)
+    save(figure, path)
 
 
 def curve_chart(curve: NDArray[np.float64], path: str | Path) -> None:
@@ -110,7 +108,7 @@ def curve_chart(curve: NDArray[np.float64], path: str | Path) -> None:
 def curves_chart(title: str, curves: Sequence[Curve], path: str | Path) -> None:
     """Precision over recall of several methods, as a .png. Raises MissingExtraError without matplotlib."""
     named = any(label for label, *_ in curves)
-    figure = _new_figure(8 if named else 5, 4)
+    figure = new_figure(8 if named else 5, 4)
     axes = figure.add_subplot(
         xlabel="recall", ylabel="precision", xlim=(0, 1.02), ylim=(0, 1.02), title=title
     )
@@ -121,7 +119,7 @@ def curves_chart(title: str, curves: Sequence[Curve], path: str | Path) -> None:
     axes.grid(alpha=0.3)
     if named:
         figure.legend(loc="outside right upper", frameon=False, fontsize="small")
-    _save(figure, path)
+    save(figure, path)
 
 
 def confusion_chart(result: Result, path: str | Path) -> None:
@@ -129,7 +127,7 @@ def confusion_chart(result: Result, path: str | Path) -> None:
 
     Raises MissingExtraError without matplotlib.
     """
-    figure = _new_figure(7, 4.5)
+    figure = new_figure(7, 4.5)
     axes = figure.add_subplot(xlabel="query", ylabel="map item")
     query = np.arange(len(result.judged))
     if result.true_item is not None:
@@ -141,7 +139,7 @@ def confusion_chart(result: Result, path: str | Path) -> None:
             query[of_kind], result.answers.item[of_kind], 5, OUTCOME_COLOURS[kind], label=OUTCOME_WORDS[kind]
         )
     figure.legend(loc="outside lower center", ncols=5, frameon=False, fontsize="small", markerscale=2)
-    _save(figure, path)
+    save(figure, path)
 
 
 def route_chart(result: Result, path: str | Path) -> None:
@@ -150,7 +148,7 @@ def route_chart(result: Result, path: str | Path) -> None:
     `result` has positions of its queries. Raises MissingExtraError without matplotlib.
     """
     assert result.query_xy is not None
-    figure = _new_figure(7, 5.5)
+    figure = new_figure(7, 5.5)
     axes = figure.add_subplot(xlabel="metres east", ylabel="metres north", aspect="equal")
     west, south = np.nanmin(result.query_xy, axis=0)
     if result.item_xy is not None:
@@ -164,25 +162,4 @@ def route_chart(result: Result, path: str | Path) -> None:
     for colour, words in zip(ERROR_COLOURS, ERROR_WORDS, strict=True):
         axes.scatter([], [], 9, colour, label=words)
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize="small", markerscale=2)
-    _save(figure, path)
-
-
-def check_there() -> None:
-    """MissingExtraError where charts cannot be drawn."""
-    _new_figure(1, 1)
-
-
-def _new_figure(width: float, height: float) -> Any:
-    """An empty figure of so many inches."""
-    try:
-        from matplotlib.figure import Figure
-    except ModuleNotFoundError as error:
-        raise MissingExtraError("matplotlib", "report", "drawing a chart") from error
-    return Figure(figsize=(width, height), layout="constrained")
-
-
-def _save(figure: Any, path: str | Path) -> None:
-    for axes in figure.axes:
-        axes.spines[["top", "right"]].set_visible(False)
-    with new_file(path, overwrite=True) as partial:
-        figure.savefig(partial, dpi=120)
+    save(figure, path)

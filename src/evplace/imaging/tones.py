@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
+from evplace.core.grey import luminance
 
 Images = NDArray[np.uint8]
 Tone = Literal["plain", "normalised", "edges"]
@@ -47,7 +48,7 @@ def edges(image: Images) -> Images:
     Where more pixels than that change equally, as in a flat image, fewer are set.
     """
     values = image.astype(np.float32)
-    grey = values if values.ndim == 2 else values @ np.array([0.299, 0.587, 0.114], np.float32)
+    grey = values if values.ndim == 2 else luminance(values)
     padded = np.pad(grey, 1, mode="edge")
     across = padded[:-2] + 2 * padded[1:-1] + padded[2:]  # (h, w + 2)
     down = padded[:, :-2] + 2 * padded[:, 1:-1] + padded[:, 2:]  # (h + 2, w)

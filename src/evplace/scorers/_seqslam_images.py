@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import InputError
 from evplace.core.events import Size
+from evplace.core.grey import MATLAB, to_grey
 
 Image = NDArray[np.uint8]
 """(height, width) grey levels."""
@@ -45,16 +46,12 @@ def prepare(
 
 
 def grey(image: NDArray[np.uint8]) -> Image:
-    """Luminance of a colour image by the weights of Rec. 601, as rgb2gray; a grey one as it is."""
+    """Luminance of a colour image as rgb2gray has it; a grey one as it is."""
     if image.dtype != np.uint8 or image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
         raise InputError(
             f"an image is uint8 (height, width) or (height, width, 3), not {image.dtype} {image.shape}"
         )
-    if image.ndim == 2:
-        return image
-    weights = np.array([0.298936, 0.587043, 0.114021])
-    levels: Image = np.floor(image @ weights + 0.5).astype(np.uint8)
-    return levels
+    return image if image.ndim == 2 else to_grey(image, MATLAB)
 
 
 def normalise_patches(

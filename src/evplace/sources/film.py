@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import DamagedRecordingError, InputError, MissingExtraError
 from evplace.core.events import Size
+from evplace.core.grey import to_grey
 from evplace.sources.frames import Frames, is_frames, open_frames
 
 Grey = NDArray[np.uint8]
@@ -48,7 +49,7 @@ class Film:
         """Each image in grey: microseconds, uint8 (H, W); errors as `images`."""
         if self.frames is None:
             return _video(self.path, "gray")
-        return ((t_us, image if image.ndim == 2 else _grey(image)) for t_us, image in self.images())
+        return ((t_us, image if image.ndim == 2 else to_grey(image)) for t_us, image in self.images())
 
     def images(self) -> Iterator[tuple[int, NDArray[np.uint8]]]:
         """Each image as it is: microseconds, uint8 (H, W), or (H, W, 3) where it has colours.
@@ -92,11 +93,6 @@ def _sized(film: Film) -> Film:
     for _, first in film:
         return Film(film.path, (first.shape[1], first.shape[0]), film.frames)
     raise InputError(f"{film.path} holds no frames")
-
-
-def _grey(image: Grey) -> Grey:
-    """(H, W) of a (H, W, 3) image (ITU-R BT.601)."""
-    return np.asarray(image @ np.array([0.299, 0.587, 0.114]) + 0.5).astype(np.uint8)
 
 
 def _on_disk(frames: Frames) -> Iterator[tuple[int, NDArray[np.uint8]]]:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.grey import BT601
 from evplace_lab.city.jit import compiled
 
 GREY = 0.24
@@ -19,6 +20,7 @@ SHOT, READ = 0.0006, 0.0025
 """Noise variance per unit of signal, and standard deviation of the read noise, both at gain 1."""
 STEPS = 4096
 GAMMA = 2.2
+R, G, B = BT601
 
 _TABLE = np.array([round(255.0 * (k / STEPS) ** (1.0 / GAMMA)) for k in range(STEPS + 1)], np.uint8)
 
@@ -55,28 +57,34 @@ class ColourCamera:
 
 @compiled
 def luminance(radiance: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(H, W) linear light of a (H, W, 3) frame: what an event sensor without colours sees."""
+    """(H, W) linear light of a (H, W, 3) frame: what an event sensor without colours sees.
+
+    `core.grey.luminance`, compiled: it runs on every frame that is rendered.
+    """
     out = np.empty(radiance.shape[:2], np.float32)
     for y in range(radiance.shape[0]):
         for x in range(radiance.shape[1]):
-            out[y, x] = 0.299 * radiance[y, x, 0] + 0.587 * radiance[y, x, 1] + 0.114 * radiance[y, x, 2]
+            out[y, x] = R * radiance[y, x, 0] + G * radiance[y, x, 1] + B * radiance[y, x, 2]
     return out
 
 
 @compiled
 def grey(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """(H, W) uint8 grey of a (H, W, 3) picture (ITU-R BT.601)."""
+    """(H, W) uint8 grey of a (H, W, 3) picture: `core.grey.to_grey`, compiled."""
     out = np.empty(picture.shape[:2], np.uint8)
     for y in range(picture.shape[0]):
         for x in range(picture.shape[1]):
-            value = 0.299 * picture[y, x, 0] + 0.587 * picture[y, x, 1] + 0.114 * picture[y, x, 2]
+            value = R * picture[y, x, 0] + G * picture[y, x, 1] + B * picture[y, x, 2]
             out[y, x] = int(value + 0.5)
     return out
 
 
 @compiled
 def _mean(radiance: NDArray[np.float32]) -> float:
-    """The mean brightness of the frame's middle, lights cut off: every second pixel is enough."""
+    """The mean brightness of the frame's middle, lights cut off: every second pixel is enough.
+
+    A light meter's weights, coarser than a picture's: with others every exposure of `city-v1` would differ.
+    """
     height, width, _ = radiance.shape
     total, count = 0.0, 0
     for y in range(height // 8, height, 2):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace import __version__
-from evplace.evaluation import OUTCOMES, Result
+from evplace.evaluation import OUTCOMES, Result, flat
 from evplace_lab.report import _tables
 from evplace_lab.report._found import Found, Sheet
 from evplace_lab.report._html import Html, join, tag
@@ -105,7 +105,7 @@ def _result(name: str, result: Result, positions: _Positions, shown: Shown) -> d
     return {
         "name": name,
         "figures": {key: _rounded(value) for key, value in result.figures.items()},
-        "settings": _tables.flat(result.settings),
+        "settings": flat(result.settings),
         "versions": result.versions,
         "took_s": result.took_s,
         "curve": _line(result_line(name, result)),

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from evplace.core.drawing import check_drawing
 from evplace.evaluation import charts
 from evplace_lab.report._found import Found, TableRow
 from evplace_lab.report._panels import Panel, panels, result_line
@@ -20,7 +21,7 @@ def plots(found: Found, page: Path) -> dict[Path, Callable[[Path], None]]:
 
     Raises MissingExtraError without matplotlib.
     """
-    charts.check_there()
+    check_drawing()
     made: dict[Path, Callable[[Path], None]] = {}
 
     def add(what: str, draw: Callable[[Path], None]) -> None:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from evplace.evaluation import Result
+from evplace.evaluation import Result, flat
 from evplace_lab.report._found import Ablation, Found, TableRow
 from evplace_lab.report._html import Html, join, tag
 
@@ -92,14 +92,6 @@ def facts(said: Mapping[str, Any]) -> Html:
         (key, value if isinstance(value, str) else json.dumps(value)) for key, value in flat(said).items()
     ]
     return tag("dl", *(join(tag("dt", key), tag("dd", value)) for key, value in pairs))
-
-
-def flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Nested mappings as one, with dots in the names."""
-    found: dict[str, Any] = {}
-    for key, value in values.items():
-        found |= flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
-    return found
 
 
 def percent(share: float | None) -> str:

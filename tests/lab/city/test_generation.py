@@ -3,11 +3,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import itertools
-import json
 import platform
-import subprocess
-import sys
-import time
 import tracemalloc
 from pathlib import Path
 
@@ -18,7 +14,7 @@ from PIL import Image
 from evplace.core.errors import OutputError, SettingsError
 from evplace.core.events import Events
 from evplace.core.settings import to_dict
-from evplace.core.workers import environment
+from evplace.core.workers import start
 from evplace.imaging.traverse import Traverse
 from evplace.sources.readers import open_recording
 from evplace_lab.city import CitySettings, Film, Progress, build_town, generate, moving_preview, preview
@@ -33,6 +29,23 @@ SMALL = CitySettings(
     height=48,
     route_length_m=60.0,
 )
+
+
+HALF_A_DRIVE = """
+import sys, threading
+from evplace.core.workers import serve
+from evplace_lab.city import worker
+
+def work(job, say):
+    def say_and_wait(share):
+        say(share)
+        threading.Event().wait()
+
+    worker.work(job, say_and_wait)
+
+sys.exit(serve(work))
+"""
+"""The city's worker, which says when it is on its way, and waits then."""
 
 
 def digest(folder: Path) -> dict[str, str]:
@@ -86,18 +99,17 @@ def test_processes_make_the_same_bytes_and_a_second_call_makes_nothing(made: Pat
     assert (folders[0] / "poses.npy").stat().st_mtime_ns == before
 
 
-def test_a_killed_drive_is_made_again_and_ends_the_same(made: Path, tmp_path: Path) -> None:
+def test_a_killed_drive_is_made_again_and_ends_the_same(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     out = tmp_path / "set"
     generate(out, SMALL, workers=1, drives=[("day", 1)])
     job = {"out": str(out), "settings": to_dict(SMALL), "condition": "night", "path": 1}
-    command, pipe = [sys.executable, "-m", "evplace_lab.city.worker"], subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, env=environment()) as process:
-        assert process.stdin is not None
+    (tmp_path / "half_a_drive.py").write_text(HALF_A_DRIVE)
+    monkeypatch.syspath_prepend(tmp_path)
+    with start("half_a_drive", job) as process:
         assert process.stdout is not None
-        process.stdin.write(json.dumps(job) + "\n")
-        process.stdin.flush()
-        process.stdout.readline()
-        time.sleep(0.1)
+        assert 0 < float(process.stdout.readline()) < 1
         process.kill()
     assert not (out / "night-1").exists()
     assert (out / ".night-1.partial").exists()

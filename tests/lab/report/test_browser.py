@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from made_results import make_result, make_unanswered, write_run
 
+from conftest import HANG_S
 from evplace_lab.report._found import Found, look
 from evplace_lab.report._page import page
 
@@ -71,7 +72,7 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Open:
         (folder / "page.html").write_text(text, "utf-8")
         address = (folder / "page.html").as_uri()
         command = [browser, *FLAGS, f"--user-data-dir={folder / 'profile'}", address]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+        done = subprocess.run(command, capture_output=True, text=True, timeout=HANG_S, check=True)
         return done.stdout, [line for line in done.stderr.splitlines() if "CONSOLE" in line]
 
     return open_page

@@ -19,7 +19,7 @@ import numpy as np
 
 from evplace.core.errors import EvplaceError
 from evplace.core.events import Events
-from evplace.sources.readers import _isolated
+from evplace.sources.readers import _decoder
 from evplace.sources.readers._recording import Recording
 from evplace.sources.readers._source import Hints
 
@@ -57,12 +57,12 @@ def check(packets: Iterable[Events], size: tuple[int, int]) -> None:
 
 
 def main(reader: str, file: str, kind: str, seed: int, first: int, count: int) -> None:
-    _isolated._limit_memory()
+    _decoder.limit_memory()
     module, path = importlib.import_module(f"evplace.sources.readers.{reader}"), Path(file)
     data, bad, size = path.read_bytes(), path.with_name(f"damaged{path.suffix}"), (240, 180)
     for number in range(first, count):
         print(number, flush=True)
-        _isolated._limit_work()
+        _decoder.limit_work()
         bad.write_bytes(damaged(data, kind, seed, number, count))
         packets = []
         with contextlib.suppress(EvplaceError):

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from made import MAKERS, SIZE, some_events
 
+from conftest import HANG_S
 from evplace.core import families
 from evplace.core.errors import DamagedRecordingError, EvplaceError, RecordingError
 from evplace.core.events import Events
@@ -86,13 +87,13 @@ def test_a_cut_anywhere_delivers_what_came_before(form: str, tmp_path: Path) -> 
 @in_this_process
 def test_flipped_bytes_give_events_in_order_or_our_error(form: str, tmp_path: Path) -> None:
     path = MAKERS[form](tmp_path, some_events(500))
-    data = path.read_bytes()
+    data, _ = path.read_bytes(), read_all(path)  # compiled before the work is measured
     flipped_file = tmp_path / f"flipped{path.suffix}"
     for number in range(FLIPS):
         flipped_file.write_bytes(damage.flipped(data, SEED, number))
-        start = time.monotonic()
+        start_s = time.process_time()
         packets, _ = read_all(flipped_file)
-        assert time.monotonic() - start < 10
+        assert time.process_time() - start_s < 10  # of work, which a busy machine does not make more
         damage.check(packets, SIZE)
 
 
@@ -106,7 +107,7 @@ def test_damage_that_the_decoder_may_not_survive(form: str, kind: str, tmp_path:
         arguments = [ISOLATED[form], str(path), kind, str(SEED), str(first), str(count)]
         worker = [sys.executable, str(Path(damage.__file__)), *arguments]
         try:
-            answer = subprocess.run(worker, capture_output=True, text=True, timeout=60 + count / 10)
+            answer = subprocess.run(worker, capture_output=True, text=True, timeout=HANG_S + count)
             said, survived = answer.stdout, answer.returncode >= 0
             assert answer.returncode <= 0, answer.stderr[-2000:]
         except subprocess.TimeoutExpired as late:

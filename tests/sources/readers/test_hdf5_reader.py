@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from made import some_events
 
+from conftest import HANG_S
 from evplace.core.errors import DamagedRecordingError, RecordingError
 from evplace.core.events import Events
 from evplace.sources.readers import _isolated, open_recording
@@ -117,11 +118,11 @@ def test_a_decoder_that_hangs_or_crashes_is_an_error(tmp_path: Path, monkeypatch
 def test_a_decoder_that_works_without_end_is_stopped(tmp_path: Path) -> None:
     """In a process of its own, whose limit is a moment; waiting is not working, and is not stopped."""
     code = (
-        "import time; from evplace.sources.readers import _isolated\n"
-        "_isolated.WORK_S = 0.2; _isolated._limit_work(); time.sleep(0.5); print('waited', flush=True)\n"
+        "import time; from evplace.sources.readers import _decoder\n"
+        "_decoder.WORK_S = 0.2; _decoder.limit_work(); time.sleep(0.5); print('waited', flush=True)\n"
         "while True: pass"
     )
-    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=HANG_S)
     assert (answer.stdout, answer.returncode) == ("waited\n", -signal.SIGPROF)
 
 

@@ -6,10 +6,8 @@ circles. Here the child may die: what it gave before is kept, and the recording 
 
 from __future__ import annotations
 
-import importlib
 import json
 import signal
-import struct
 import subprocess
 import sys
 import threading
@@ -21,23 +19,15 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core import errors
-from evplace.core.errors import DamagedRecordingError, EvplaceError
+from evplace.core.errors import DamagedRecordingError
+from evplace.core.workers import start, unpacked
+from evplace.sources.readers import _decoder
 from evplace.sources.readers._source import Block, Hints, Source
 
-WORK_S = 8.0
-"""Seconds of its own work within which the child gives a block; beyond that it goes round in circles. They
-are counted where the system can: a busy machine must not make a good recording look damaged."""
 PATIENCE_S = 120.0
 """Seconds by the clock within which a block must come; beyond that the child waits for ever."""
-MEMORY = 4 << 30
-"""Bytes of address space that the child may take, where the system can limit it; a block needs far less."""
-SLICE = 1 << 19
-"""Events that a message carries at most."""
 PIPE = 1 << 20
 """Bytes that the pipe holds, where the system lets it be set: the two processes then rarely wait."""
-_FRAME = struct.Struct("<cqq")
-"""Kind (H header, B block, E end), then two numbers: bytes and 0, or events and untimed events."""
 
 
 def isolated(reader: str, path: Path, hints: Hints) -> Source:
@@ -59,12 +49,10 @@ class _Child:
 
     def __init__(self, reader: str, path: Path, hints: Hints, header_only: bool) -> None:
         self._path = path
-        wanted = {"reader": reader, "path": str(path), "size": hints.size, "unit": hints.time_unit}
-        code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", code, json.dumps(wanted | {"head": header_only})],
-            stdout=subprocess.PIPE,
-            stdin=subprocess.DEVNULL,
+        job = {"reader": reader, "path": str(path), "size": hints.size, "unit": hints.time_unit}
+        self._process = start(
+            _decoder.__name__,
+            job | {"head": header_only},
             stderr=subprocess.DEVNULL,
             pipesize=PIPE if sys.platform == "linux" else -1,
         )
@@ -80,17 +68,22 @@ class _Child:
 
     def _within(self, seconds: float) -> dict[str, Any] | Block | None:
         """The next message; DamagedRecordingError where none comes in time or the child died."""
-        watchdog = threading.Timer(seconds, self._process.kill)
+        late = threading.Event()
+
+        def stop() -> None:
+            late.set()  # before the end of the pipe is seen, which says only that the child is gone
+            self._process.kill()
+
+        watchdog = threading.Timer(seconds, stop)
         watchdog.start()
         try:
             assert self._process.stdout is not None
             return _message(self._process.stdout)
         except EOFError:
-            late = watchdog.finished.is_set()
             self._process.kill()  # which does nothing to one that has ended: its code stays what it was
             endless = self._process.wait() == -getattr(signal, "SIGPROF", 0)
-            waited = WORK_S if endless else seconds
-            reason = f"it gave nothing for {waited:g} s" if late or endless else "it crashed"
+            waited = _decoder.WORK_S if endless else seconds
+            reason = f"it gave nothing for {waited:g} s" if late.is_set() or endless else "it crashed"
             raise DamagedRecordingError(
                 f"{self._path} is damaged: its decoder was stopped, as {reason}"
             ) from None
@@ -99,7 +92,7 @@ class _Child:
 
 
 def _message(pipe: IO[bytes]) -> dict[str, Any] | Block | None:
-    kind, first, second = _FRAME.unpack(_exactly(pipe, _FRAME.size))
+    kind, first, second = _decoder.FRAME.unpack(_exactly(pipe, _decoder.FRAME.size))
     if kind == b"B":
         fields: list[NDArray[Any]] = [
             np.frombuffer(_exactly(pipe, first * np.dtype(kind).itemsize), kind)
@@ -110,8 +103,7 @@ def _message(pipe: IO[bytes]) -> dict[str, Any] | Block | None:
     if kind == b"H":
         return about
     if about:
-        error = getattr(errors, about["error"])
-        raise error.__new__(error, about["text"])  # past an __init__ that would build the text again
+        raise unpacked(about)
     return None
 
 
@@ -125,54 +117,3 @@ def _exactly(pipe: IO[bytes], length: int) -> bytearray:
             raise EOFError
         got += part
     return data
-
-
-def serve() -> None:
-    """The child: decode what the arguments name, and write messages to the standard output."""
-    wanted = json.loads(sys.argv[1])
-    _limit_memory()
-    _limit_work()
-    pipe = sys.stdout.buffer
-    try:
-        reader = importlib.import_module(f"evplace.sources.readers.{wanted['reader']}")
-        size = None if wanted["size"] is None else (wanted["size"][0], wanted["size"][1])
-        source: Source = reader.open_here(Path(wanted["path"]), Hints(size, wanted["unit"]))
-        _send(pipe, b"H", {"size": source.size, "notes": source.notes})
-        if not wanted["head"]:
-            for block in source.blocks():
-                _send_block(pipe, block)
-        _send(pipe, b"E", {})
-    except EvplaceError as error:
-        _send(pipe, b"E", {"error": type(error).__name__, "text": str(error)})
-
-
-def _limit_memory() -> None:
-    if sys.platform != "win32":
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        if sys.platform != "darwin":
-            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-
-
-def _limit_work() -> None:
-    """Have the system end this process after WORK_S seconds of work from now on, even within C code."""
-    if sys.platform != "win32":
-        signal.setitimer(signal.ITIMER_PROF, WORK_S)
-
-
-def _send(pipe: IO[bytes], kind: bytes, value: dict[str, Any]) -> None:
-    data = json.dumps(value).encode()
-    pipe.write(_FRAME.pack(kind, len(data), 0) + data)
-    pipe.flush()
-
-
-def _send_block(pipe: IO[bytes], block: Block) -> None:
-    for start in range(0, len(block.t_us), SLICE):
-        part = slice(start, start + SLICE)
-        count = len(block.t_us[part])
-        pipe.write(_FRAME.pack(b"B", count, block.untimed if start == 0 else 0))
-        for field in block[:4]:
-            pipe.write(np.ascontiguousarray(field[part]).data)
-    pipe.flush()
-    _limit_work()

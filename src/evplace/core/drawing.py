@@ -1,0 +1,31 @@
+"""Figures to draw on: one look for all pictures, and one error where matplotlib is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from evplace.core.errors import MissingExtraError
+from evplace.core.storage import new_file
+
+
+def new_figure(width: float, height: float) -> Any:
+    """An empty matplotlib figure of so many inches; MissingExtraError without matplotlib."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingExtraError("matplotlib", "report", "drawing a picture") from error
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def check_drawing() -> None:
+    """MissingExtraError where nothing can be drawn: for saying so before the work."""
+    new_figure(1, 1)
+
+
+def save(figure: Any, path: str | Path) -> None:
+    """Write a figure as a .png, whole or not at all, without the upper and right edges of its axes."""
+    for axes in figure.axes:
+        axes.spines[["top", "right"]].set_visible(False)
+    with new_file(path, overwrite=True) as partial:
+        figure.savefig(partial, dpi=120)
