@@ -121,7 +121,7 @@ def test_the_mask_of_a_traverse_is_kept_and_serves_a_stream(
 
 
 def test_a_live_stream_needs_a_mask_where_the_map_was_learned_with_one(clean_map: PlaceMap) -> None:
-    with pytest.raises(SettingsError, match="give a mask"):
+    with pytest.raises(SettingsError, match="give a `mask`"):
         list(Localizer(clean_map, "best").push(NOISY.events))
     nothing = np.zeros((60, 80), np.bool_)
     found: list[Match] = list(Localizer(clean_map, "best", mask=nothing).push(NOISY.events))

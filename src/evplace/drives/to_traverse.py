@@ -99,8 +99,8 @@ def open_source(
     images; SettingsError where one is given that has no meaning for what `path` is.
     """
     place = Path(path)
-    of_recordings: dict[str, object] = {"--size": size, "--time-unit": time_unit}
-    of_images: dict[str, object] = {"--list": listing, "--fps": fps}
+    of_recordings: dict[str, object] = {"size": size, "time_unit": time_unit}
+    of_images: dict[str, object] = {"listing": listing, "fps": fps}
     is_folder = place.is_dir() and not is_recording(place)
     if drive is not None or dataset is not None or (is_folder and datasets.matching(place)):
         _refuse(f"{place} is a data set, which has its own size, times and order", of_recordings | of_images)
@@ -219,9 +219,9 @@ def is_kept(drive: Drive, kind: Kind | None = None) -> bool:
     return isinstance(_as(kind, drive), Film)
 
 
-def _refuse(what: str, flags: Mapping[str, object]) -> None:
-    """SettingsError where a flag is given that has no meaning."""
-    said = [flag for flag, value in flags.items() if value is not None]
+def _refuse(what: str, arguments: Mapping[str, object]) -> None:
+    """SettingsError where an argument is given that has no meaning."""
+    said = [f"`{name}`" for name, value in arguments.items() if value is not None]
     if said:
         raise SettingsError(f"{what}: leave out {' and '.join(said)}")
 
@@ -229,7 +229,7 @@ def _refuse(what: str, flags: Mapping[str, object]) -> None:
 def _listed_film(folder: Path, listing: str | Path | None, fps: float | None) -> Film:
     frames = open_frames(folder, listing) if fps is None else open_frames(folder, listing, fps)
     if frames.timed:
-        _refuse(f"the images in {folder} have times of their own", {"--fps": fps})
+        _refuse(f"the images in {folder} have times of their own", {"fps": fps})
     return film_of(folder, frames)
 
 
@@ -301,7 +301,7 @@ def _aligned(track: Track | None, t_us: NDArray[np.int64]) -> Track | None:
 def _apart(track: Track, images: str) -> TrackError:
     return TrackError(
         f"the track and the images do not overlap: the track runs from {_seconds(track.t_us)}, the images "
-        f"{images}; give the recording's own track, or shift the track's times"
+        f"{images}; give the recording's own track, or shift the track's times with `offset_us`"
     )
 
 

@@ -60,7 +60,7 @@ def truth_of(place_map: PlaceMap, query: Traverse, rule: Rule = "places") -> Tru
     if isinstance(place_map.places, PlaceRuns):
         return _by_runs(place_map, place_map.places, query)
     if track is None:
-        raise EvaluationError("the query has no positions: give its track, or the truth as a matrix")
+        raise EvaluationError("the query has no positions: give its `track`, or the `truth` as a matrix")
     _check_overlap(place_map, track)
     truth = _by_place(place_map, place_map.places, track)
     return only_views(truth, track, _references(place_map)) if rule == "view" else truth

@@ -153,7 +153,7 @@ class Voxel:
 def _outside(events: Events) -> RecordingError:
     return RecordingError(
         f"an event at column {events.x.max()}, row {events.y.max()} lies outside the sensor of "
-        f"{events.size[0]}x{events.size[1]}: give the sensor's real size"
+        f"{events.size[0]}x{events.size[1]}: give the sensor's real `size`"
     )
 
 
