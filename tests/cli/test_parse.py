@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -286,6 +288,31 @@ def test_a_flag_of_two_values_stands_anywhere(command: str, names: tuple[str, ..
             args = args_of(command, *line)
             assert args.size == (640, 480)
             assert [getattr(args, name) for name in names] == [Path(word) for word in words]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_what_is_wrong_with_flags_is_told_plainly(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch, encoding: str
+) -> None:
+    """Whether or not the terminal can show frames."""
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding))
+    for words, wanted in (
+        (("convert", "a"), "Missing from evplace convert: PATH The file to write"),
+        (("info", "a", "--size", "3"), "Missing value for argument '--size'. Expected 2 values"),
+        (("info", "a", "--time-unit", "h"), "invalid choice 'h' for argument '--time-unit'"),
+        (
+            ("train", "a", "-o", "b", "--dropout", "some"),
+            "Error parsing --dropout: could not convert string to float: 'some'",
+        ),
+        (("train", "a", "-o", "b", "--bogus"), "Unrecognized options: --bogus"),
+        (("train", "--settings"), "Missing value for argument '--settings'. Expected 1 values"),
+    ):
+        assert main([*words]) == 2
+        told = capsys.readouterr().err
+        assert told.startswith(f"evplace: {wanted}")
+        assert told.endswith(f"; see evplace {words[0]} --help\n")
+        assert not set(told) & set("│╭─")
+        assert " --- " not in told
 
 
 def test_a_flag_of_too_few_values_is_told(capsys: Capture) -> None:

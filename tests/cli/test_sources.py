@@ -75,6 +75,14 @@ def test_what_is_not_said_is_the_data_sets_own(tmp_path: Path, capsys: Capture) 
     assert "unknown setting 'given'" in fault(capsys, *out, "--settings", toml)
 
 
+def test_the_settings_that_are_shown_are_those_of_the_data_set(tmp_path: Path, capsys: Capture) -> None:
+    write_robotcar(tmp_path)
+    shown = said(capsys, "images", tmp_path, "--drive", DATE, "--height=30", "--show-settings")
+    assert shown["windows.dt"] == {"value": "1/16", "from": "input"}
+    assert shown["images.height"] == {"value": 30, "from": "flag"}
+    assert said(capsys, "images", "--show-settings")["windows.dt"] == {"value": "1/30", "from": "default"}
+
+
 def test_a_video_is_simulated_or_kept(tmp_path: Path, capsys: Capture) -> None:
     video, out = write_video(tmp_path / "film.mp4"), tmp_path / "t"
     assert said(capsys, "images", video, "-o", out)["shape"] == [90, 160]

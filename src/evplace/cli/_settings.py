@@ -129,3 +129,7 @@ class SettingsFlags:
     """A TOML file with any of these settings, named as --show-settings names them; flags win over it."""
     show_settings: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Print every setting and where it came from, and do nothing else."""
+
+    def brought(self) -> dict[str, Any]:
+        """Tables of settings that the input brings with it, in place of the defaults."""
+        return {}

@@ -78,6 +78,13 @@ class Args(TrackFlags):
     """Print one JSON object."""
     given: Annotated[tuple[str, ...], tyro.conf.Suppress] = ()
 
+    def brought(self) -> dict[str, Any]:
+        """The windows and images of the source's own, where one is named."""
+        if self.source == Path():
+            return {}
+        drive = _source(self)
+        return {"windows": drive.windows, "images": drive.images}
+
 
 def run(args: Args) -> int:
     """Write the traverse, and the sheet if asked."""
@@ -113,8 +120,7 @@ def run(args: Args) -> int:
 
 def _record(args: Args, writer: TraverseWriter) -> str | None:
     """Write the images; returns what broke off, if anything."""
-    fps = args.fps if "fps" in args.given else None
-    drive = open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps)
+    drive = _source(args)
     _check_meant(args, drive)
     windows, images = _over(drive.windows, args.windows, args), _over(drive.images, args.images, args)
     with remarks():
@@ -129,6 +135,11 @@ def _record(args: Args, writer: TraverseWriter) -> str | None:
             args.mask,
             args.kind,
         )
+
+
+def _source(args: Args) -> Drive:
+    fps = args.fps if "fps" in args.given else None
+    return open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps)
 
 
 def _check_meant(args: Args, drive: Drive) -> None:

@@ -35,7 +35,9 @@ def load(family: str, name: str) -> ModuleType:
     """The part `name` of a family; SettingsError, with the known names, where there is none."""
     known = names(family)
     if name not in known:
-        raise SettingsError(f"'{name}' is none of the {family}: known are {', '.join(known)}")
+        raise SettingsError(
+            f"'{name}' is none of the {family.rpartition('.')[2]}: known are {', '.join(known)}"
+        )
     return importlib.import_module(f"{_package(family)}.{name}")
 
 
