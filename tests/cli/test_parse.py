@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib
 import io
 import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
 import tyro
+from hypothesis import given
+from hypothesis import strategies as st
 
 from conftest import make_drive, write_drive
 from evplace.cli import _modules, _parse, commands, main
@@ -42,8 +46,6 @@ def fault(capsys: Capture, *words: object) -> str:
 
 def args_of(command: str, *words: object) -> Any:
     """What the words of a command are read as."""
-    import importlib
-
     module = importlib.import_module(_modules()[command])
     return _parse.parse(module, command, [*map(str, words)]).args
 
@@ -54,8 +56,6 @@ def toml(tmp_path: Path) -> Path:
 
 
 def test_these_commands_take_settings() -> None:
-    import importlib
-
     modules = {name: importlib.import_module(_modules()[name]) for name in commands()}
     assert tuple(n for n in sorted(modules) if issubclass(modules[n].Args, SettingsFlags)) == TAKE_SETTINGS
 
@@ -247,6 +247,51 @@ def test_what_is_wrong_with_a_file(toml: Path, capsys: Capture, text: str, wante
     told = fault(capsys, "images", "--show-settings", "--settings", toml)
     assert wanted in told
     assert str(toml) in told
+
+
+TOML = st.recursive(
+    st.booleans() | st.integers() | st.floats() | st.text(max_size=8) | st.dates(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@pytest.mark.parametrize(
+    ("command", "text", "flags", "wanted"),
+    [
+        ("train", 'preset = "moon"', (), "{}: the table [train] has no preset 'moon'"),
+        ("train", 'preset = "sun"', ("--preset", "moon"), "evplace: the table [train] has no preset 'moon'"),
+        ("train", 'scorer = "moon"', (), "{}: 'moon' is none of the scorers"),
+        ("train", 'scorer = "sun"', ("--scorer", "moon"), "evplace: 'moon' is none of the scorers"),
+        ("match", 'preset = "moon"', (), "{}: the matcher 'local' has no preset 'moon'"),
+        ("match", "[set]\nmoon = 1", (), "{}: unknown setting 'moon'"),
+        ("match", "[set]\nK = 1", ("--set", "moon=1"), "evplace: unknown setting 'moon'"),
+        ("match", "[set]\nK = 1", ("--set=moon=1", "--preset", "paper"), "evplace: unknown setting 'moon'"),
+        ("match", "[set]\nds = 11", ("--matcher=best",), "{}: unknown setting 'ds'"),
+        ("simulate", 'preset = "moon"', (), "{}: the sensor has no preset 'moon'"),
+        ("images", '"new\\nline" = 1', (), "{}: unknown setting 'new line'"),
+    ],
+)
+def test_the_file_is_named_where_it_is_wrong(
+    toml: Path, capsys: Capture, command: str, text: str, flags: tuple[str, ...], wanted: str
+) -> None:
+    toml.write_text(text)
+    assert wanted.format(toml) in fault(capsys, command, "--show-settings", "--settings", toml, *flags)
+
+
+@given(data=st.data(), command=st.sampled_from(TAKE_SETTINGS), value=TOML)
+def test_any_value_of_any_key_is_taken_or_refused(data: st.DataObject, command: str, value: object) -> None:
+    kind = importlib.import_module(_modules()[command]).Args
+    hints = get_type_hints(kind)
+    key = data.draw(st.sampled_from([field.name for field in dataclasses.fields(kind)]))
+    values = {key: value}
+    if dataclasses.is_dataclass(hints[key]):
+        inner = [field.name for field in dataclasses.fields(hints[key])]
+        values = {key: {data.draw(st.sampled_from(inner)): value}}
+    try:
+        _parse._default(kind, _parse._First(Path("s.toml")), values)
+    except SettingsError as error:
+        assert str(error).startswith("s.toml: ")  # noqa: PT017 - both outcomes are right
 
 
 def test_a_file_may_hold_all_that_flags_can_say(tmp_path: Path, toml: Path, capsys: Capture) -> None:

@@ -68,8 +68,8 @@ def print_facts(title: str, facts: Mapping[str, object]) -> None:
 
 
 def note(text: str) -> None:
-    """A remark beside the answer: on standard error."""
-    print(f"evplace: {in_flags(text)}", file=sys.stderr)
+    """A remark beside the answer: one line on standard error."""
+    print(f"evplace: {in_flags(' '.join(text.splitlines()))}", file=sys.stderr)
 
 
 def note_guesses(notes: object) -> None:

@@ -86,11 +86,12 @@ def parse(module: ModuleType, name: str, arguments: list[str]) -> Parsed:
     default = _default(kind, first, values)
     args = _read(kind, name, arguments, default=default, description=module.__doc__)
     _check_numbers(args)
+    given = _given(arguments, args, default)
     for part in getattr(kind, "PARTS", ()):
-        with _named(first.settings if values.get(part.pairs) else None):
+        by_file = any(name in values and name not in given - {part.pairs} for name in part.fields)
+        with _named(first.settings if by_file else None):
             part.resolved(args, values.get(part.pairs, {}))
         part.resolved(args, dict(getattr(args, part.pairs)))
-    given = _given(arguments, args, default)
     if hasattr(args, "given"):
         named = sorted(name.rpartition(".")[2] for name in {*given, *_keys(values)})
         args = dataclasses.replace(args, given=tuple(named))
@@ -120,7 +121,8 @@ def _default(kind: type[Any], first: _First, values: dict[str, Any]) -> Any:
         of_file = settings.make(kind, values, kind(**base))
     preset = first.preset if first.preset is not None else getattr(of_file, "preset", None)
     for table, presets in getattr(kind, "TABLE_PRESETS", {}).items():
-        chosen = settings.preset_of(f"the table [{table}]", presets, preset)
+        with _named(first.settings if first.preset is None else None):
+            chosen = settings.preset_of(f"the table [{table}]", presets, preset)
         base |= {table: chosen} if chosen is not None else {}
     with _named(first.settings):
         return settings.make(kind, values, kind(**base))
