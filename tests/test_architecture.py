@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
+import importlib
+import re
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, get_type_hints
 
 import pytest
+
+from evplace.cli import _modules
+from evplace.cli._output import ARGUMENT, in_flags
 
 SRC = Path(__file__).parents[1] / "src"
 
@@ -78,3 +86,36 @@ def test_import_loads_numpy_and_nothing_heavier() -> None:
     code = f"import sys, evplace; print([name for name in {heavy} if name in sys.modules])"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert answer.stdout.strip() == "[]"
+
+
+def texts(file: Path) -> Iterator[str]:
+    """The texts of a file that are no docstrings; values in them are 0."""
+    tree = ast.parse(file.read_text())
+    parts = {part for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    alone = {node.value for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in parts | alone:
+            yield node.value
+        elif isinstance(node, ast.JoinedStr):
+            yield "".join(str(part.value) if isinstance(part, ast.Constant) else "0" for part in node.values)
+
+
+def test_only_the_command_line_speaks_of_flags() -> None:
+    """The library names arguments in backquotes, and each of them is a flag of some command."""
+    flags = {
+        in_flags(f"`{name}`")
+        for module in _modules().values()
+        for name in _flat_fields(importlib.import_module(module).Args)
+    }
+    for file in (file for file in SRC.rglob("*.py") if "cli" not in file.relative_to(SRC).parts):
+        for text in texts(file):
+            assert not re.search(r"(?<![\w-])--[a-z]", text), (file, text)
+            for argument in ARGUMENT.finditer(text):
+                assert in_flags(argument[0]).split()[0] in flags, (file, argument[0])
+
+
+def _flat_fields(kind: type[Any]) -> Iterator[str]:
+    hints = get_type_hints(kind)
+    for field in dataclasses.fields(kind):
+        inner = hints[field.name]
+        yield from _flat_fields(inner) if dataclasses.is_dataclass(inner) else (field.name,)

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
+import importlib
+import io
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
 import tyro
+from hypothesis import given
+from hypothesis import strategies as st
 
 from conftest import make_drive, write_drive
 from evplace.cli import _modules, _parse, commands, main
@@ -40,8 +46,6 @@ def fault(capsys: Capture, *words: object) -> str:
 
 def args_of(command: str, *words: object) -> Any:
     """What the words of a command are read as."""
-    import importlib
-
     module = importlib.import_module(_modules()[command])
     return _parse.parse(module, command, [*map(str, words)]).args
 
@@ -52,8 +56,6 @@ def toml(tmp_path: Path) -> Path:
 
 
 def test_these_commands_take_settings() -> None:
-    import importlib
-
     modules = {name: importlib.import_module(_modules()[name]) for name in commands()}
     assert tuple(n for n in sorted(modules) if issubclass(modules[n].Args, SettingsFlags)) == TAKE_SETTINGS
 
@@ -247,6 +249,51 @@ def test_what_is_wrong_with_a_file(toml: Path, capsys: Capture, text: str, wante
     assert str(toml) in told
 
 
+TOML = st.recursive(
+    st.booleans() | st.integers() | st.floats() | st.text(max_size=8) | st.dates(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=4), inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@pytest.mark.parametrize(
+    ("command", "text", "flags", "wanted"),
+    [
+        ("train", 'preset = "moon"', (), "{}: the table [train] has no preset 'moon'"),
+        ("train", 'preset = "sun"', ("--preset", "moon"), "evplace: the table [train] has no preset 'moon'"),
+        ("train", 'scorer = "moon"', (), "{}: 'moon' is none of the scorers"),
+        ("train", 'scorer = "sun"', ("--scorer", "moon"), "evplace: 'moon' is none of the scorers"),
+        ("match", 'preset = "moon"', (), "{}: the matcher 'local' has no preset 'moon'"),
+        ("match", "[set]\nmoon = 1", (), "{}: unknown setting 'moon'"),
+        ("match", "[set]\nK = 1", ("--set", "moon=1"), "evplace: unknown setting 'moon'"),
+        ("match", "[set]\nK = 1", ("--set=moon=1", "--preset", "paper"), "evplace: unknown setting 'moon'"),
+        ("match", "[set]\nds = 11", ("--matcher=best",), "{}: unknown setting 'ds'"),
+        ("simulate", 'preset = "moon"', (), "{}: the sensor has no preset 'moon'"),
+        ("images", '"new\\nline" = 1', (), "{}: unknown setting 'new line'"),
+    ],
+)
+def test_the_file_is_named_where_it_is_wrong(
+    toml: Path, capsys: Capture, command: str, text: str, flags: tuple[str, ...], wanted: str
+) -> None:
+    toml.write_text(text)
+    assert wanted.format(toml) in fault(capsys, command, "--show-settings", "--settings", toml, *flags)
+
+
+@given(data=st.data(), command=st.sampled_from(TAKE_SETTINGS), value=TOML)
+def test_any_value_of_any_key_is_taken_or_refused(data: st.DataObject, command: str, value: object) -> None:
+    kind = importlib.import_module(_modules()[command]).Args
+    hints = get_type_hints(kind)
+    key = data.draw(st.sampled_from([field.name for field in dataclasses.fields(kind)]))
+    values = {key: value}
+    if dataclasses.is_dataclass(hints[key]):
+        inner = [field.name for field in dataclasses.fields(hints[key])]
+        values = {key: {data.draw(st.sampled_from(inner)): value}}
+    try:
+        _parse._default(kind, _parse._First(Path("s.toml")), values)
+    except SettingsError as error:
+        assert str(error).startswith("s.toml: ")  # noqa: PT017 - both outcomes are right
+
+
 def test_a_file_may_hold_all_that_flags_can_say(tmp_path: Path, toml: Path, capsys: Capture) -> None:
     write_drive(tmp_path, "day", make_drive(windows=4))
     toml.write_text(
@@ -286,6 +333,31 @@ def test_a_flag_of_two_values_stands_anywhere(command: str, names: tuple[str, ..
             args = args_of(command, *line)
             assert args.size == (640, 480)
             assert [getattr(args, name) for name in names] == [Path(word) for word in words]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_what_is_wrong_with_flags_is_told_plainly(
+    capsys: Capture, monkeypatch: pytest.MonkeyPatch, encoding: str
+) -> None:
+    """Whether or not the terminal can show frames."""
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding))
+    for words, wanted in (
+        (("convert", "a"), "Missing from evplace convert: PATH The file to write"),
+        (("info", "a", "--size", "3"), "Missing value for argument '--size'. Expected 2 values"),
+        (("info", "a", "--time-unit", "h"), "invalid choice 'h' for argument '--time-unit'"),
+        (
+            ("train", "a", "-o", "b", "--dropout", "some"),
+            "Error parsing --dropout: could not convert string to float: 'some'",
+        ),
+        (("train", "a", "-o", "b", "--bogus"), "Unrecognized options: --bogus"),
+        (("train", "--settings"), "Missing value for argument '--settings'. Expected 1 values"),
+    ):
+        assert main([*words]) == 2
+        told = capsys.readouterr().err
+        assert told.startswith(f"evplace: {wanted}")
+        assert told.endswith(f"; see evplace {words[0]} --help\n")
+        assert not set(told) & set("│╭─")
+        assert " --- " not in told
 
 
 def test_a_flag_of_too_few_values_is_told(capsys: Capture) -> None:

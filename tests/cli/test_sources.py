@@ -12,6 +12,7 @@ from PIL import Image
 
 from conftest import make_drive, write_drive
 from evplace.cli import main
+from evplace.imaging.traverse import Traverse
 from made_sets import SAN_FRANCISCO, picture, write_gta, write_lens, write_own, write_robotcar, write_utm
 
 Capture = pytest.CaptureFixture[str]
@@ -75,6 +76,14 @@ def test_what_is_not_said_is_the_data_sets_own(tmp_path: Path, capsys: Capture) 
     assert said(capsys, *out, "--settings", toml)["shape"] == [21, 7]
     toml.write_text('given = "width"\n')
     assert "unknown setting 'given'" in fault(capsys, *out, "--settings", toml)
+
+
+def test_the_settings_that_are_shown_are_those_of_the_data_set(tmp_path: Path, capsys: Capture) -> None:
+    write_robotcar(tmp_path)
+    shown = said(capsys, "images", tmp_path, "--drive", DATE, "--height=30", "--show-settings")
+    assert shown["windows.dt"] == {"value": "1/16", "from": "input"}
+    assert shown["images.height"] == {"value": 30, "from": "flag"}
+    assert said(capsys, "images", "--show-settings")["windows.dt"] == {"value": "1/30", "from": "default"}
 
 
 def test_a_video_is_simulated_or_kept(tmp_path: Path, capsys: Capture) -> None:

@@ -155,7 +155,7 @@ def test_real_recordings(data: Path, name: str) -> None:
     found = examine(data / "events" / name)
     assert {f.name: f.state for f in found.findings if f.state in ("bad", "look")} == ALARMS[name]
     if "flicker" in ALARMS[name]:
-        assert found.named("flicker").advice == "--flicker-hz 120"
+        assert found.named("flicker").advice == "`flicker_hz=120`"
 
 
 def test_real_frames_and_a_real_track(data: Path) -> None:

@@ -69,8 +69,8 @@ def test_a_hole_and_made_up_times(tmp_path: Path) -> None:
     (tmp_path / "timestamps.txt").unlink()
     made_up = examine(tmp_path, fps=25).named("frame times")
     assert (made_up.state, made_up.value) == ("look", pytest.approx(25))
-    assert "--fps" in made_up.sentence
-    assert "--fps" not in made_up.advice
+    assert "`fps`" in made_up.sentence
+    assert "`fps`" not in made_up.advice
 
 
 @pytest.mark.parametrize("unit", [1e6, 1e-3])

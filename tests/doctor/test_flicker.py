@@ -25,7 +25,7 @@ def test_a_lamp_is_found_in_its_region_at_its_frequency(frequency_hz: int) -> No
     events = merged(noise(4000, 2), lamp(frequency_hz + 0.1))
     finding = found(flicker, events, "flicker")
     assert finding.state in ("look", "bad")
-    assert finding.advice == f"--flicker-hz {frequency_hz}"
+    assert finding.advice == f"`flicker_hz={frequency_hz}`"
     assert f"{frequency_hz} Hz in 1 of 12 regions" in finding.sentence
     (drawing,) = outcome(flicker, events).drawings
     assert isinstance(drawing, Map)

@@ -24,7 +24,7 @@ def test_known_hot_pixels_are_circled() -> None:
     scene = noise(30_000, 4)
     events = merged(scene, fired(1000, 4))
     finding = found(hot, events, "hot pixels")
-    assert (finding.state, finding.advice) == ("look", "--mask-hot")
+    assert (finding.state, finding.advice) == ("look", "`mask_hot=True`")
     assert finding.value == pytest.approx(100 * 3000 / 33_000, rel=0.05)
     assert finding.sentence.startswith("3 of 3,072 pixels")
     (drawing,) = outcome(hot, events).drawings

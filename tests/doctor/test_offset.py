@@ -99,7 +99,7 @@ def test_the_finding_tells_what_to_add(added_s: float, state: str) -> None:
     finding = found(offset, events, "clock offset", track)
     assert finding.state == state
     assert finding.value == pytest.approx(added_s, abs=1.0)
-    assert ("--track-offset" in finding.advice) == (state == "bad")
+    assert ("`offset_us`" in finding.advice) == (state == "bad")
     (curve,) = outcome(offset, events, track).drawings
     assert isinstance(curve, Curve)
     assert curve.x[np.argmax(curve.y)] == pytest.approx(added_s, abs=1.0)

@@ -45,7 +45,7 @@ def test_events_outside_are_counted(tmp_path: Path) -> None:
     x[::100] = 200
     finding = examine(written(tmp_path, EVENTS, x=x)).named("events outside the sensor")
     assert (finding.state, finding.value) == ("bad", pytest.approx(1, rel=0.01))
-    assert "--size" in finding.advice
+    assert "`size`" in finding.advice
 
 
 def test_steps_back_are_counted(tmp_path: Path) -> None:

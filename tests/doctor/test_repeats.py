@@ -51,4 +51,4 @@ def test_events_written_twice(share: float, state: str) -> None:
 def test_bursts_of_pixels_name_the_refractory_period() -> None:
     burst = Events.of(np.arange(0, 100_000, 100), np.full(1000, 5), np.full(1000, 5), np.ones(1000), SIZE)
     finding = found(repeats, burst, "quick repeats")
-    assert (finding.state, finding.advice) == ("look", "--refractory-us 1000")
+    assert (finding.state, finding.advice) == ("look", "`refractory_us=1000`")

@@ -35,13 +35,13 @@ def test_stands_are_measured_by_events_and_by_the_track() -> None:
     assert (still.state, still.value) == ("look", pytest.approx(100 * 17 / 60, abs=4))
     assert "2 stretches" in quiet.sentence
     assert "2 stretches" in still.sentence
-    assert "--every-m" in still.advice
+    assert "`every_m=1`" in still.advice
     assert [drawing.name for drawing in outcome(standing, events, track).drawings] == ["activity", "speed"]
 
 
 def test_without_a_track_events_are_counted_off() -> None:
     finding = found(standing, drive([(30.0, 42.0)]), "quiet stretches")
-    assert "--every-events" in finding.advice
+    assert "`every_events`" in finding.advice
 
 
 def test_a_short_stop_and_a_steady_drive_are_good() -> None:

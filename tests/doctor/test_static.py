@@ -19,7 +19,7 @@ def test_a_bonnet_is_measured() -> None:
     finding = found(static, above(32), "static regions")
     assert (finding.state, finding.value) == ("look", pytest.approx(100 / 3))
     assert "rows 32 to 47, columns 0 to 63" in finding.sentence
-    assert "--static-mask" in finding.advice
+    assert "`static_mask=True`" in finding.advice
 
 
 def test_a_sensor_that_sees_everything_is_good_and_few_events_do_not_tell() -> None:

@@ -123,7 +123,7 @@ def test_the_mask_of_a_traverse_is_kept_and_serves_a_stream(
 
 
 def test_a_live_stream_needs_a_mask_where_the_map_was_learned_with_one(clean_map: PlaceMap) -> None:
-    with pytest.raises(SettingsError, match="give a mask"):
+    with pytest.raises(SettingsError, match="give a `mask`"):
         list(Localizer(clean_map, "best").push(NOISY.events))
     nothing = np.zeros((60, 80), np.bool_)
     found: list[Match] = list(Localizer(clean_map, "best", mask=nothing).push(NOISY.events))
@@ -163,7 +163,7 @@ def test_images_that_are_made_are_not_cleaned_again(noisy: tuple[Path, Path], tm
     open_traverse(noisy[0]).save(tmp_path / "plain")
     with pytest.raises(TraverseError, match="mask_hot False, not True: make it again"):
         open_traverse(tmp_path / "plain", mask_hot=True)
-    with pytest.raises(TraverseError, match="'mask' cannot change them"):
+    with pytest.raises(TraverseError, match="`mask` cannot change them"):
         open_traverse(tmp_path / "plain", mask=np.zeros((60, 80), np.bool_))
     assert len(open_traverse(tmp_path / "plain", mask_hot=False)) == 60
 

@@ -120,7 +120,7 @@ def test_images_without_position_or_events_are_left_out_where_there_is_a_choice(
 
 
 def test_what_cannot_be_spaced_is_said(tmp_path: Path) -> None:
-    with pytest.raises(SettingsError, match="give its track"):
+    with pytest.raises(SettingsError, match="give its `track`"):
         Spacer(SpacingSettings(every_m=2))
     with pytest.raises(SettingsError, match="give one"):
         SpacingSettings(every_m=2, every_events=5)

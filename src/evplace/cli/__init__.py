@@ -16,6 +16,7 @@ from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 
+from evplace.cli._output import note
 from evplace.core.errors import EvplaceError
 
 INTERRUPTED = 130
@@ -27,10 +28,10 @@ def main(argv: list[str] | None = None) -> int:
     try:
         return _run(arguments)
     except EvplaceError as error:
-        print(f"evplace: {error}", file=sys.stderr)
+        note(str(error))
         return 2
     except KeyboardInterrupt:
-        print("evplace: interrupted; nothing half-written was left", file=sys.stderr)
+        note("interrupted; nothing half-written was left")
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has gone (`evplace ... | head`): that is no fault.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,8 +13,24 @@ from typing import Any
 
 Show = Callable[[int, int, str], None]
 """Moves a progress bar: (done, total, remark)."""
+ARGUMENT = re.compile(r"`([a-z]\w*)(?:=([^`]*))?`")
+"""An argument as the library's texts name it: see `evplace.core.errors`."""
+FLAGS = {"listing": "list", "offset_us": "track_offset"}
+"""Argument of the library -> field of Args, where their names differ."""
 USED_GOOD_PART = 3
 """Exit code where a recording is damaged and its good part was used."""
+
+
+def in_flags(text: str) -> str:
+    """A text of the library with its arguments as flags: `time_unit` is --time-unit, `fps=30` is --fps 30."""
+    return ARGUMENT.sub(_flag, text)
+
+
+def _flag(argument: re.Match[str]) -> str:
+    name, value = FLAGS.get(argument[1], argument[1]).replace("_", "-"), argument[2]
+    if value in (None, "True"):
+        return f"--{name}"
+    return f"--no-{name}" if value == "False" else f"--{name} {value}"
 
 
 def print_json(value: object) -> None:
@@ -51,8 +68,8 @@ def print_facts(title: str, facts: Mapping[str, object]) -> None:
 
 
 def note(text: str) -> None:
-    """A remark beside the answer: on standard error."""
-    print(f"evplace: {text}", file=sys.stderr)
+    """A remark beside the answer: one line on standard error."""
+    print(f"evplace: {in_flags(' '.join(text.splitlines()))}", file=sys.stderr)
 
 
 def note_guesses(notes: object) -> None:
@@ -103,7 +120,7 @@ def _text(value: object) -> str:
         return ", ".join(f"{inner:,} {name}" for name, inner in value.items() if inner) or "none"
     if isinstance(value, int) and not isinstance(value, bool):
         return f"{value:,}"
-    return "-" if value is None else str(value)
+    return "-" if value is None else in_flags(str(value))
 
 
 def _plain(value: Any) -> Any:

@@ -53,11 +53,15 @@ class Parsed:
     """The fields that flags gave, as `windows.dt`."""
 
     def in_force(self) -> dict[str, tuple[object, str]]:
-        """Setting -> its value and its source: default, preset NAME, the file's name, or flag."""
+        """Setting -> its value and its source: default, input, preset NAME, the file's name, or flag."""
         preset = getattr(self.args, "preset", None)
         sources = dict.fromkeys(self._of_preset(preset), f"preset {preset}")
         sources |= dict.fromkeys(_keys(self.values), str(self.file)) | dict.fromkeys(self.given, "flag")
-        found = {name: (value, sources.get(name, "default")) for name, value in _flat(self.args).items()}
+        brought = {name: (value, "input") for name, value in _flat_tables(self.args.brought()).items()}
+        found = {
+            name: (value, sources[name]) if name in sources else brought.get(name, (value, "default"))
+            for name, value in _flat(self.args).items()
+        }
         for part in self.args.PARTS:
             del found[part.pairs]
             found |= part.in_force(self.args, self.values.get(part.pairs, {}), str(self.file))
@@ -82,11 +86,12 @@ def parse(module: ModuleType, name: str, arguments: list[str]) -> Parsed:
     default = _default(kind, first, values)
     args = _read(kind, name, arguments, default=default, description=module.__doc__)
     _check_numbers(args)
+    given = _given(arguments, args, default)
     for part in getattr(kind, "PARTS", ()):
-        with _named(first.settings if values.get(part.pairs) else None):
+        by_file = any(name in values and name not in given - {part.pairs} for name in part.fields)
+        with _named(first.settings if by_file else None):
             part.resolved(args, values.get(part.pairs, {}))
         part.resolved(args, dict(getattr(args, part.pairs)))
-    given = _given(arguments, args, default)
     if hasattr(args, "given"):
         named = sorted(name.rpartition(".")[2] for name in {*given, *_keys(values)})
         args = dataclasses.replace(args, given=tuple(named))
@@ -117,7 +122,8 @@ def _default(kind: type[Any], first: _First, values: dict[str, Any]) -> Any:
     preset = first.preset if first.preset is not None else getattr(of_file, "preset", None)
     for table, presets in getattr(kind, "TABLE_PRESETS", {}).items():
         base |= {table: presets[preset]} if preset in presets else {}
-    return settings.make(kind, values, kind(**base))
+    with _named(first.settings):
+        return settings.make(kind, values, kind(**base))
 
 
 def _nothing(hint: Any) -> Any:
@@ -155,8 +161,9 @@ def _read(kind: type[Any], name: str, arguments: list[str], **more: Any) -> Any:
     except SystemExit as stop:
         if not stop.code:
             raise
-        hint = _greedy(kind, arguments)
-        raise SettingsError(f"{_plain(said.getvalue())}{hint}; see evplace {name} --help") from None
+        message = _plain(said.getvalue())
+        hint = _greedy(kind, arguments) if message.startswith("Missing from") else ""
+        raise SettingsError(f"{message}{hint}; see evplace {name} --help") from None
 
 
 def _without_none(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
@@ -176,15 +183,17 @@ def _without_none(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | No
 
 def _plain(message: str) -> str:
     """Tyro's framed message as one line, without its title and the help that it adds."""
-    lines = [line.strip("│╰╯─ \n") for line in message.splitlines() if not line.startswith("╭")]
+    lines = (line.strip("│╭╮╰╯─ \n") for line in message.splitlines())
+    _, *said = [line for line in lines if line.strip("-")] or [""]
     ends = ("Argument helptext", "For full helptext")
-    said = itertools.takewhile(lambda line: not line.startswith(ends), lines)
-    return " ".join(line for line in said if line).rstrip(".") or "the flags cannot be read"
+    kept = itertools.takewhile(lambda line: not line.startswith(ends), said)
+    return " ".join(kept).rstrip(".") or "the flags cannot be read"
 
 
 def _greedy(kind: type[Any], arguments: list[str]) -> str:
     """A hint where a flag that takes any number of words may have taken those that stand by themselves."""
-    lists = [name for name, hint in get_type_hints(kind).items() if Ellipsis in get_args(hint)]
+    hints = {name: get_args(hint) for name, hint in get_type_hints(kind).items()}
+    lists = [name for name, inner in hints.items() if Ellipsis in inner and isinstance(inner[0], type)]
     taken = sorted(_flag(name) for name in lists if _is_given(name, arguments))
     return f"; {taken[0]} takes all words after it: put what stands by itself before it" if taken else ""
 
@@ -198,13 +207,16 @@ def _check_numbers(given: object) -> None:
 
 def _flat(given: object) -> dict[str, Any]:
     """The fields of a dataclass by name, those of one within it as `windows.dt`."""
+    names = [field.name for field in dataclasses.fields(given)]  # type: ignore[arg-type]  # Args are dataclasses
+    return _flat_tables({name: getattr(given, name) for name in names})
+
+
+def _flat_tables(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by name, those of a dataclass among them as `windows.dt`."""
     found: dict[str, Any] = {}
-    for field in dataclasses.fields(given):  # type: ignore[arg-type]  # Args are dataclasses
-        value = getattr(given, field.name)
-        if dataclasses.is_dataclass(value):
-            found |= {f"{field.name}.{key}": inner for key, inner in _flat(value).items()}
-        else:
-            found[field.name] = value
+    for name, value in values.items():
+        inner = _flat(value) if dataclasses.is_dataclass(value) else None
+        found |= {name: value} if inner is None else {f"{name}.{key}": inner[key] for key in inner}
     return found
 
 

@@ -74,8 +74,15 @@ class Part:
     """The field of Args that holds them."""
     preset: str
     """The field that names the preset; empty where the part has none."""
+    chooser: str
+    """The field that chooses the part; empty where there is but one."""
     chosen: Callable[[Any], tuple[str, type[Any], Mapping[str, Any]] | None]
     """Args -> the part in words, its settings' dataclass and its presets; None where no part is chosen."""
+
+    @property
+    def fields(self) -> tuple[str, str, str]:
+        """The fields of Args that say what the part's settings are."""
+        return self.pairs, self.preset, self.chooser
 
     @classmethod
     def of(cls, family: str, word: str, pairs: str = "set", preset: str = "") -> Part:
@@ -83,6 +90,7 @@ class Part:
         return cls(
             pairs,
             preset,
+            word,
             lambda args: (
                 f"the {word} '{getattr(args, word)}'",
                 *families.settings_of(family, getattr(args, word)),
@@ -129,3 +137,7 @@ class SettingsFlags:
     """A TOML file with any of these settings, named as --show-settings names them; flags win over it."""
     show_settings: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Print every setting and where it came from, and do nothing else."""
+
+    def brought(self) -> dict[str, Any]:
+        """Tables of settings that the input brings with it, in place of the defaults."""
+        return {}

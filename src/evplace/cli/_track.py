@@ -28,7 +28,7 @@ def _format(args: TrackFlags) -> tuple[str, type[Any], Mapping[str, Any]] | None
 class TrackFlags(SettingsFlags):
     """Where the drive was, and how its log is to be read."""
 
-    PARTS: ClassVar[tuple[Part, ...]] = (Part("track_set", "track_preset", _format),)
+    PARTS: ClassVar[tuple[Part, ...]] = (Part("track_set", "track_preset", "track", _format),)
 
     track: Path | None = None
     """GPS log of the same drive: NMEA, GPX or csv."""

@@ -15,13 +15,13 @@ names flags of `evplace images`.
 from __future__ import annotations
 
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import tyro
 
-from evplace.cli._output import USED_GOOD_PART, note, print_json
+from evplace.cli._output import USED_GOOD_PART, in_flags, note, print_json
 from evplace.cli._track import TrackFlags
 from evplace.doctor import STATES, Examination, Finding, as_json, check_drawing, draw, examine
 
@@ -71,6 +71,7 @@ def run(args: Args) -> int:
         args.drive,
         args.dataset,
     )
+    found = replace(found, findings=tuple(map(_with_flags, found.findings)))
     if args.report is not None:
         draw(found, args.report, args.overwrite)
     if args.json:
@@ -80,6 +81,11 @@ def run(args: Args) -> int:
     if found.fault is not None:
         note(f"{found.fault}; what came before it was examined")
     return USED_GOOD_PART if found.fault is not None else 0
+
+
+def _with_flags(finding: Finding) -> Finding:
+    """A finding whose texts name flags."""
+    return replace(finding, sentence=in_flags(finding.sentence), advice=in_flags(finding.advice))
 
 
 def _lines(found: Examination) -> list[str]:

@@ -24,6 +24,7 @@ from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts,
 from evplace.cli._recipe import recipe_settings
 from evplace.cli._track import TrackFlags
 from evplace.core.storage import check_new_file
+from evplace.drives.datasets import Drive
 from evplace.drives.to_traverse import open_source, record
 from evplace.imaging.images import ImageSettings
 from evplace.imaging.sheets import contact_sheet
@@ -70,6 +71,13 @@ class Args(TrackFlags):
     """Print one JSON object."""
     given: Annotated[tuple[str, ...], tyro.conf.Suppress] = ()
 
+    def brought(self) -> dict[str, Any]:
+        """The windows and images of the source's own, where one is named."""
+        if self.source == Path():
+            return {}
+        drive = _source(self)
+        return {"windows": drive.recipe.windows, "images": drive.recipe.images}
+
 
 def run(args: Args) -> int:
     """Write the traverse, and the sheet if asked."""
@@ -105,8 +113,7 @@ def run(args: Args) -> int:
 
 def _record(args: Args, writer: TraverseWriter) -> str | None:
     """Write the images; returns what broke off, if anything."""
-    fps = args.fps if "fps" in args.given else None
-    drive = open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps)
+    drive = _source(args)
     with remarks():
         return record(
             drive, writer, args.opened_track(), None, args.spacing, args.mask, **_named(args)
@@ -115,3 +122,8 @@ def _record(args: Args, writer: TraverseWriter) -> str | None:
 
 def _named(args: Args) -> dict[str, Any]:
     return recipe_settings(args) | ({} if args.kind is None else {"kind": args.kind})
+
+
+def _source(args: Args) -> Drive:
+    fps = args.fps if "fps" in args.given else None
+    return open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps)

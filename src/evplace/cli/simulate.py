@@ -33,7 +33,7 @@ class Args(SettingsFlags):
     """Flags of `evplace simulate`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (
-        Part("set", "preset", lambda _: ("the sensor", SensorSettings, PRESETS)),
+        Part("set", "preset", "", lambda _: ("the sensor", SensorSettings, PRESETS)),
     )
 
     film: tyro.conf.Positional[Path]
@@ -56,7 +56,8 @@ class Args(SettingsFlags):
 
 def run(args: Args) -> int:
     """Simulate and write."""
-    sensor = settings_room.make(SensorSettings, dict(args.set), PRESETS[args.preset])
+    preset = settings_room.preset_of("the sensor", PRESETS, args.preset)
+    sensor = settings_room.make(SensorSettings, dict(args.set), preset)
     film = open_film(args.film, args.fps)
     packets = _Counted(simulate(film, film.size, sensor, args.seed))
     fault = None

@@ -136,6 +136,6 @@ def _scorer(args: Args) -> Scorer | Descriptor:
         return make(TrainSettings, dict(args.set), args.train)
     trained = [name for name in vars(args.train) if name in args.given]
     if trained:
-        raise SettingsError(f"'{trained[0]}' means nothing for the scorer '{args.scorer}': leave it out")
+        raise SettingsError(f"`{trained[0]}` means nothing for the scorer '{args.scorer}': leave it out")
     part: Scorer | Descriptor = families.make("scorers", args.scorer, args.preset, dict(args.set))
     return part

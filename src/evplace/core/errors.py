@@ -15,8 +15,10 @@ EvplaceError
 │   └── EvaluationError      truth and answers that do not fit
 └── OutputError              an output exists, is being written by another process, or the disk is full
 
-The text of each says what is wrong, what was given, and what to do. Only the command line catches
-EvplaceError: it prints one line and exits with 2, or with 3 where a good part was used.
+The text of each says what is wrong, what was given, and what to do. It names the library's arguments in
+backquotes, `time_unit` or `fps=30`, and never a flag; the command line shows such words as its flags,
+--time-unit and --fps 30. Settings, which are keys of a file as well, stand in quotes: 'dt'. Only the command
+line catches EvplaceError: it prints one line and exits with 2, or with 3 where a good part was used.
 """
 
 from __future__ import annotations

@@ -199,7 +199,7 @@ def sha256(path: Path) -> str:
 
 def _refuse_existing(target: Path, overwrite: bool) -> None:
     if target.exists() and not overwrite:
-        raise OutputError(f"{target} exists: choose another name, remove it, or add --overwrite")
+        raise OutputError(f"{target} exists: choose another name, remove it, or add `overwrite=True`")
 
 
 def _replace(target: Path, partial: Path) -> None:

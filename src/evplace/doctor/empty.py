@@ -46,7 +46,7 @@ class Check:
             f"the others hold {mean:,.0f} on average."
         )
         state: State = "good" if share < 1 else "look" if share < 10 else "bad"
-        advice = "" if state == "good" else "choose a longer --dt; --every-events N leaves empty ones out"
+        advice = "" if state == "good" else "choose a longer `dt`; `every_events` leaves empty ones out"
         return Outcome([Finding("empty windows", state, share, "%", told, advice)])
 
     def _number(self, t_us: int) -> int:

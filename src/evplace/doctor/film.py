@@ -75,7 +75,7 @@ def _times(steps: NDArray[np.int64], fps: float, timed: bool) -> Finding:
     told = f"{len(steps) + 1:,} frames, {fps:.1f} a second; {counted(late, 'comes', 'come')} late."
     if not timed:
         return Finding(
-            "frame times", "look", fps, "frames/s", f"{told} It has no times: the rate is that of --fps.",
+            "frame times", "look", fps, "frames/s", f"{told} It has no times: the rate is that of `fps`.",
             "put timestamps.txt (seconds, one a line) beside the images",
         )  # fmt: skip
     if not SLOWEST_FPS <= fps <= FASTEST_FPS:

@@ -65,7 +65,7 @@ def _finding(beats: NDArray[np.int64], events: NDArray[np.float64]) -> Finding:
     return Finding(
         "flicker", state, share, "%",
         f"Lamps beat at {told} of {beats.size:,} regions, which give {share:.1f} % of the events.",
-        "" if state == "good" else f"--flicker-hz {MAINS_HZ[int(np.argmax(weights))]}",
+        "" if state == "good" else f"`flicker_hz={MAINS_HZ[int(np.argmax(weights))]}`",
     )  # fmt: skip
 
 

@@ -37,5 +37,5 @@ def _leap(at_s: float, length_s: float) -> Finding:
     return Finding(
         "gaps", "bad", length_s, "s",
         f"The clock leaps ahead by {length_s:,.0f} s at {at_s:.3f} s: no event comes for over an hour.",
-        "cut the recording there, or mend its times; check the --time-unit",
+        "cut the recording there, or mend its times; check the `time_unit`",
     )  # fmt: skip

@@ -114,7 +114,7 @@ def _covered(subject: Subject, track: Track) -> Finding:
             f"The track and the recording do not overlap: the track runs from {track.t_us[0] / 1e6:.3f} s to "
             f"{track.t_us[-1] / 1e6:.3f} s, the recording from {subject.t_first_us / 1e6:.3f} s to "
             f"{subject.t_last_us / 1e6:.3f} s.",
-            "give the recording's own track, or shift its times: open_track(..., offset_us=N)",
+            "give the recording's own track, or shift its times with `offset_us`",
         )  # fmt: skip
     state: State = "good" if share >= 95 else "look" if share >= 50 else "bad"
     told = f"{share:.1f} % of the recording has a position."

@@ -21,7 +21,7 @@ class Check(AtTheEnd):
         number, share = int(hot.sum()), 100 * float(counts[hot].sum()) / max(float(counts.sum()), 1.0)
         state: State = "good" if share < 1 else "look" if share < 10 else "bad"
         told = f"{number:,} of {hot.size:,} pixels fire by themselves, with {share:.2f} % of the events."
-        advice = "" if state == "good" else "--mask-hot"
+        advice = "" if state == "good" else "`mask_hot=True`"
         rows, columns = np.nonzero(hot)
         drawing = Map(
             "hot_pixels",

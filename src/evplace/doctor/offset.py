@@ -194,6 +194,7 @@ def _finding(offset: Offset) -> Finding:
         return Finding("clock offset", "good", offset.seconds, "s", told)
     state: State = "look" if away - offset.uncertainty_s < 2 else "bad"
     advice = (
-        f"--track-offset {offset.seconds:.2f} (on top of one that was given), or set both clocks by GPS time"
+        f"shift the track's times by {offset.seconds:.2f} s with `offset_us` (on top of a shift that was "
+        "given), or set both clocks by GPS time"
     )
     return Finding("clock offset", state, offset.seconds, "s", told, advice)

@@ -45,7 +45,7 @@ class Check:
         subject = self._subject
         if subject.span_s == 0:
             told = "All events have one time: nothing that needs a time can be told."
-            return Finding("event rate", "bad", None, "events/s", told, "give the right --time-unit")
+            return Finding("event rate", "bad", None, "events/s", told, "give the right `time_unit`")
         rate = subject.parts / subject.span_s
         told = f"{rate / 1e6:.3f} million events/s"
         if subject.span_s * 1e6 >= 2 * BIN_US:

@@ -28,7 +28,7 @@ class Check(AtTheEnd):
                 _dropped(
                     "events outside the sensor", dropped["out_of_range"], total,
                     "lie outside the sensor",
-                    "give the sensor's true size with --size WIDTH HEIGHT",
+                    "give the sensor's true size with `size`",
                 ),
                 _dropped(
                     "order of time", dropped["backwards"], total,
@@ -61,7 +61,7 @@ def _remarks(notes: list[str]) -> Finding:
     return Finding(
         "remarks", "look", len(notes), "",
         f"The reader remarks: {'; '.join(notes)}.",
-        "where that is wrong, give --size WIDTH HEIGHT or --time-unit",
+        "where that is wrong, give `size` or `time_unit`",
     )  # fmt: skip
 
 

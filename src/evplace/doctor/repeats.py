@@ -50,7 +50,7 @@ def _twice(number: int, total: int) -> Finding:
     return Finding(
         "duplicates", state, share, "%",
         f"{number:,} of {total:,} events equal the one before them of their pixel: time, place and sign.",
-        "" if state == "good" else "--refractory-us 1 drops them; look for packets that were written twice",
+        "" if state == "good" else "`refractory_us=1` drops them; look for packets that were written twice",
     )  # fmt: skip
 
 
@@ -59,7 +59,7 @@ def _soon(number: int, total: int) -> Finding:
     told = f"{100 * share:.1f} % of the events follow one of their pixel within {SOON_US / 1000:g} ms."
     if share < MANY:
         return Finding("quick repeats", "good", 100 * share, "%", told)
-    return Finding("quick repeats", "look", 100 * share, "%", told, f"--refractory-us {SOON_US}")
+    return Finding("quick repeats", "look", 100 * share, "%", told, f"`refractory_us={SOON_US}`")
 
 
 @njit(cache=True)

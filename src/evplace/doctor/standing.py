@@ -101,8 +101,8 @@ def _finding(name: str, found: Stretches, subject: Subject, t_us: NDArray[np.int
     )
     state: State = "good" if share < MUCH else "look"
     thin = (
-        "--every-m 1 makes an image a metre"
+        "`every_m=1` makes an image a metre"
         if subject.track is not None
-        else "--every-events N makes few images"
+        else "`every_events` makes few images"
     )
     return Finding(name, state, share, "%", told, "" if state == "good" else f"{thin} where it stands")

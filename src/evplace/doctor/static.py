@@ -34,7 +34,7 @@ class Check(AtTheEnd):
         told = f"{share:.1f} % of the sensor hardly ever see a change{_where(static)}."
         if share < MUCH:
             return Outcome([Finding("static regions", "good", share, "%", told)], [drawing])
-        advice = "--static-mask; a bonnet at the bottom can also be cut with --crop-bottom"
+        advice = "`static_mask=True`; a bonnet at the bottom can also be cut with `crop_bottom`"
         return Outcome([Finding("static regions", "look", share, "%", told, advice)], [drawing])
 
 

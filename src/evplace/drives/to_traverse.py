@@ -93,8 +93,8 @@ def open_source(
     images; SettingsError where one is given that has no meaning for what `path` is.
     """
     place = Path(path)
-    of_recordings: dict[str, object] = {"--size": size, "--time-unit": time_unit}
-    of_images: dict[str, object] = {"--list": listing, "--fps": fps}
+    of_recordings: dict[str, object] = {"size": size, "time_unit": time_unit}
+    of_images: dict[str, object] = {"listing": listing, "fps": fps}
     is_folder = place.is_dir() and not is_recording(place)
     if drive is not None or dataset is not None or (is_folder and datasets.matching(place)):
         _refuse(f"{place} is a data set, which has its own size, times and order", of_recordings | of_images)
@@ -237,7 +237,7 @@ def _opened_again(
     given = [name for name, value in asked.items() if value is not None]
     if given:
         raise TraverseError(
-            f"the images in {path} are made already: '{given[0]}' cannot change them, leave it out or {again}"
+            f"the images in {path} are made already: `{given[0]}` cannot change them, leave it out or {again}"
         )
     if recipe is not None and found.recipe is not None:
         found.recipe.require_same(recipe, f"the traverse {path}", "the recipe asked for", again)
@@ -257,7 +257,7 @@ def _check_made_so(path: Path, made: Recipe | None, settings: Mapping[str, Any],
     """TraverseError where images that are made already have another value of a setting."""
     if made is None:
         raise TraverseError(
-            f"how the images in {path} were made is not known: leave out '{next(iter(settings))}'"
+            f"how the images in {path} were made is not known: leave out `{next(iter(settings))}`"
         )
     apart = made.changed(**settings).differences(made)
     for name, (wanted, value) in apart.items():
@@ -280,13 +280,13 @@ def _check_kind(kind: Kind | None, path: str, settings: Mapping[str, Any]) -> No
     """SettingsError where a setting is named that means nothing for camera images, or for events."""
     idle = [name for name in settings if name in (OF_EVENTS if kind == "frames" else ("tone",))]
     if idle:
-        what, hint = ("camera images", ", or take kind 'events'") if kind == "frames" else ("events", "")
-        raise SettingsError(f"'{idle[0]}' means nothing for the {what} of {path}: leave it out{hint}")
+        what, hint = ("camera images", ", or add `kind=events`") if kind == "frames" else ("events", "")
+        raise SettingsError(f"`{idle[0]}` means nothing for the {what} of {path}: leave it out{hint}")
 
 
-def _refuse(what: str, flags: Mapping[str, object]) -> None:
-    """SettingsError where a flag is given that has no meaning."""
-    said = [flag for flag, value in flags.items() if value is not None]
+def _refuse(what: str, arguments: Mapping[str, object]) -> None:
+    """SettingsError where an argument is given that has no meaning."""
+    said = [f"`{name}`" for name, value in arguments.items() if value is not None]
     if said:
         raise SettingsError(f"{what}: leave out {' and '.join(said)}")
 
@@ -294,7 +294,7 @@ def _refuse(what: str, flags: Mapping[str, object]) -> None:
 def _listed_film(folder: Path, listing: str | Path | None, fps: float | None) -> Film:
     frames = open_frames(folder, listing) if fps is None else open_frames(folder, listing, fps)
     if frames.timed:
-        _refuse(f"the images in {folder} have times of their own", {"--fps": fps})
+        _refuse(f"the images in {folder} have times of their own", {"fps": fps})
     return film_of(folder, frames)
 
 
@@ -344,7 +344,7 @@ def _aligned(track: Track | None, t_us: NDArray[np.int64]) -> Track | None:
 def _apart(track: Track, images: str) -> TrackError:
     return TrackError(
         f"the track and the images do not overlap: the track runs from {_seconds(track.t_us)}, the images "
-        f"{images}; give the recording's own track, or shift the track's times"
+        f"{images}; give the recording's own track, or shift the track's times with `offset_us`"
     )
 
 

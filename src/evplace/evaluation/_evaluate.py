@@ -71,7 +71,7 @@ def truth_of(
     if isinstance(place_map.places, PlaceRuns):
         return _by_runs(place_map, place_map.places, query)
     if track is None:
-        raise EvaluationError("the query has no positions: give its track, or the truth as a matrix")
+        raise EvaluationError("the query has no positions: give its `track`, or the `truth` as a matrix")
     _check_overlap(place_map, track)
     if rule == "radius":
         return by_radius(track.xy, place_map.items.position, radius_m)

@@ -94,7 +94,7 @@ def positions_at(t_us: ArrayLike, track: Track, max_gap_s: float = 1.0, max_gap_
     if not found.known.any():
         raise EvaluationError(
             f"no query has a position: the queries span {_span(times)}, the track {_span(track.t_us)}: "
-            "give the track of this drive, or shift its times by an offset"
+            "give the track of this drive, or shift its times with `offset_us`"
         )
     return found
 

@@ -46,7 +46,7 @@ class Spacer:
         """SettingsError where images are to be kept by distance and there is no track."""
         self.settings = settings or SpacingSettings()
         if self.settings.every_m and track is None:
-            raise SettingsError("images every so many metres need the positions of the drive: give its track")
+            raise SettingsError("images every so many metres need the drive's positions: give its `track`")
         self.left_out = dict.fromkeys(REASONS, 0)
         """Images left out so far, by reason: too near the last kept one, without position, after too few
         events, without events."""
@@ -86,7 +86,7 @@ class Spacer:
 
     def _busy(self, events: int) -> str | None:
         if events < 0:
-            raise SettingsError("camera images have no events to keep them by: give 'every_m' and a track")
+            raise SettingsError("camera images have no events to keep them by: give `every_m` and a `track`")
         self._events += events
         if self._events < self.settings.every_events:
             return "few_events"

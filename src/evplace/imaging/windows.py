@@ -105,7 +105,7 @@ class TimeWindows:
             raise RecordingError(
                 f"the clock leaps: from {end_us / MICROSECONDS:.3f} s to {t_us / MICROSECONDS:.3f} s no "
                 f"event comes, which makes {empty:,} empty images: cut the recording there, or mend its "
-                "times (is it the right --time-unit?)"
+                "times (is it the right `time_unit`?)"
             )
 
     def _close(self) -> Window:

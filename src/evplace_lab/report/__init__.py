@@ -43,7 +43,7 @@ def report(folder: str | Path, out: str | Path | None = None, overwrite: bool = 
         planned, remark = {}, f"No plots beside this page: {error}"
     there = next((plot for plot in planned if plot.exists()), None)
     if there is not None and not overwrite:
-        raise OutputError(f"{there} exists: name another page, remove it, or add --overwrite")
+        raise OutputError(f"{there} exists: name another page, remove it, or add `overwrite=True`")
     with new_file(target, overwrite) as partial:
         partial.write_text(page(found, remark), "utf-8")
         for plot, draw in planned.items():

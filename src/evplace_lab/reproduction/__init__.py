@@ -123,7 +123,7 @@ def _of_city(progress: Progress | None) -> Callable[[CityProgress], None] | None
 def _real_sets(data: str | Path | None) -> RealSets:
     """The sets in a folder of data; InputError where none is there."""
     if data is None:
-        raise InputError("real sets are not made but read: give the folder that holds them with --data")
+        raise InputError("real sets are not made but read: give the folder that holds them with `data`")
     found = RealSets(Path(data))
     if not found.present:
         raise InputError(f"{data} holds none of the real sets that there are recipes for")

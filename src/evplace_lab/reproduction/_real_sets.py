@@ -76,7 +76,7 @@ class RealSets:
     def present(self) -> list[RealSet]:
         """The sets whose drives and truth are all there; InputError where there is no folder of data."""
         if not self.data.is_dir():
-            raise InputError(f"there is no folder of data {self.data}: give one with --data")
+            raise InputError(f"there is no folder of data {self.data}: give one with `data`")
         return [one for one in recipes("real", RealSet) if all(file.exists() for file in self._files(one))]
 
     def source(self, case: Case) -> dict[str, Any]:

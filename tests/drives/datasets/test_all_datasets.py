@@ -53,7 +53,7 @@ def test_folders_that_are_no_set_or_several(tmp_path: Path) -> None:
         open_drive(tmp_path, "day", "robotcar")
     write_gta(tmp_path)
     write_robotcar(tmp_path)
-    with pytest.raises(DatasetError, match="may be gta or robotcar: say which with --dataset"):
+    with pytest.raises(DatasetError, match="may be gta or robotcar: say which with `dataset`"):
         open_drive(tmp_path, "day")
     assert open_drive(tmp_path, "day", "gta").track is not None
     assert drives(tmp_path, "robotcar") == ["2014-12-09-13-21-02"]

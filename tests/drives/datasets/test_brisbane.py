@@ -55,7 +55,7 @@ def test_the_drives_that_are_there(tmp_path: Path) -> None:
     assert drives(tmp_path) == ["sunset1", "night"]
     with pytest.raises(DatasetError, match="holds no drive 'sunrise': it holds sunset1, night"):
         open_drive(tmp_path, "sunrise")
-    with pytest.raises(DatasetError, match="2 drives: say which with --drive: sunset1, night"):
+    with pytest.raises(DatasetError, match="2 drives: say which with `drive`: sunset1, night"):
         open_drive(tmp_path)
 
 

@@ -60,7 +60,7 @@ def open_drive(folder: str | Path, drive: str | None = None, dataset: str | None
     if not known:
         raise DatasetError(f"{place} holds no drive of {name}, which needs: {part.NEEDS}")
     if drive is None and len(known) > 1:
-        raise DatasetError(f"{place} holds {len(known)} drives: say which with --drive: {', '.join(known)}")
+        raise DatasetError(f"{place} holds {len(known)} drives: say which with `drive`: {', '.join(known)}")
     if drive is not None and drive not in known:
         raise DatasetError(f"{place} holds no drive '{drive}': it holds {', '.join(known)}")
     with families.blaming("datasets", part):
@@ -98,5 +98,5 @@ def _name_of(folder: Path, dataset: str | None) -> str:
             "`evplace list datasets` says what each needs"
         )
     if len(found) > 1:
-        raise DatasetError(f"{folder} may be {' or '.join(found)}: say which with --dataset")
+        raise DatasetError(f"{folder} may be {' or '.join(found)}: say which with `dataset`")
     return found[0]

@@ -95,7 +95,7 @@ def write_images(traverse: Traverse, folder: str | Path, overwrite: bool = False
 
     track = traverse.track
     if track is None or not track.known.any():
-        raise TrackError("the drive has no positions: make it with --track, then write its images")
+        raise TrackError("the drive has no positions: make it with its `track`, then write its images")
     if traverse.images.ndim == 4 and traverse.images.shape[-1] != 3:
         raise TraverseError(
             f"images of {traverse.images.shape[-1]} channels cannot be written as .jpg: make them grey or RGB"

@@ -14,7 +14,7 @@ from evplace.core.events import Events
 def outside(events: Events) -> RecordingError:
     return RecordingError(
         f"an event at column {events.x.max()}, row {events.y.max()} lies outside the sensor of "
-        f"{events.size[0]}x{events.size[1]}: give the sensor's real size"
+        f"{events.size[0]}x{events.size[1]}: give the sensor's real `size`"
     )
 
 

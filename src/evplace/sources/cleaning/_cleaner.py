@@ -25,8 +25,8 @@ class Cleaner:
         settings = settings or CleaningSettings()
         if settings.measured and mask is None:
             raise SettingsError(
-                "mask_hot and static_mask are measured over a whole recording, and a stream has none yet: "
-                "give a mask (a file of x,y lines or a .npy file)"
+                "`mask_hot` and `static_mask` are measured over a whole recording, and a stream has none "
+                "yet: give a `mask` (a file of x,y lines or a .npy file)"
             )
         self.dropped: dict[str, int] = {}
         """Reason -> events left out so far; only the reasons that were asked for."""
