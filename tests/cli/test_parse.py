@@ -259,8 +259,13 @@ TOML = st.recursive(
 @pytest.mark.parametrize(
     ("command", "text", "flags", "wanted"),
     [
-        ("train", 'preset = "moon"', (), "{}: the table [train] has no preset 'moon'"),
-        ("train", 'preset = "sun"', ("--preset", "moon"), "evplace: the table [train] has no preset 'moon'"),
+        ("train", 'preset = "moon"', (), "{}: the scorer 'network' has no preset 'moon'"),
+        (
+            "train",
+            'preset = "sun"',
+            ("--preset", "moon"),
+            "evplace: the scorer 'network' has no preset 'moon'",
+        ),
         ("train", 'scorer = "moon"', (), "{}: 'moon' is none of the scorers"),
         ("train", 'scorer = "sun"', ("--scorer", "moon"), "evplace: 'moon' is none of the scorers"),
         ("match", 'preset = "moon"', (), "{}: the matcher 'local' has no preset 'moon'"),

@@ -12,6 +12,7 @@ from PIL import Image
 
 from conftest import make_drive, write_drive
 from evplace.cli import main
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import Traverse
 from made_sets import SAN_FRANCISCO, picture, write_gta, write_lens, write_own, write_robotcar, write_utm
 
@@ -47,8 +48,10 @@ def write_video(path: Path, images: int = 12) -> Path:
     return path
 
 
-def info_of(traverse: Path) -> Any:
-    return json.loads((traverse / "traverse.json").read_text())["info"]
+def recipe_of(traverse: Path) -> Recipe:
+    recipe = Traverse.load(traverse).recipe
+    assert recipe is not None
+    return recipe
 
 
 def test_a_drive_of_a_data_set(tmp_path: Path, capsys: Capture) -> None:
@@ -57,13 +60,12 @@ def test_a_drive_of_a_data_set(tmp_path: Path, capsys: Capture) -> None:
     facts = said(capsys, "images", tmp_path / "oxford", "--drive", DATE, "-o", out)
     assert facts["shape"] == [90, 160]
     assert facts["with_position"] > 0
-    recipe = Traverse.load(out).recipe
-    assert recipe is not None
-    assert (recipe.kind, recipe.windows.dt) == ("events", "1/16")
+    assert recipe_of(out).kind == "events"
+    assert recipe_of(out).windows.dt == "1/16"
     again = ("images", tmp_path / "oxford", "--overwrite", "-o", out)
     assert said(capsys, *again, "--kind", "frames", "--width", 40)["shape"] == [90, 40, 3]
     said(capsys, *again, "--dt", "1/30")
-    assert info_of(out)["windows"]["dt"] == "1/30"
+    assert recipe_of(out).windows.dt == "1/30"
 
 
 def test_what_is_not_said_is_the_data_sets_own(tmp_path: Path, capsys: Capture) -> None:
@@ -138,7 +140,7 @@ def test_a_traverse_becomes_a_folder_of_images(tmp_path: Path, capsys: Capture) 
 def test_the_list_of_one_family(capsys: Capture) -> None:
     parts = said(capsys, "list", "datasets")
     assert list(parts) == ["datasets"]
-    assert "Needs DATE/stereo/centre/*.png" in parts["datasets"]["robotcar"]
+    assert "Needs DATE/stereo/centre/*.png" in parts["datasets"]["robotcar"]["about"]
     assert set(parts) < set(said(capsys, "list"))
     assert "colours" in fault(capsys, "list", "colours")
 
@@ -206,7 +208,7 @@ def test_flags_without_a_meaning_are_refused(tmp_path: Path, capsys: Capture) ->
         (npz, ("--fps", 5, "--list", "nope.csv"), "leave out --list and --fps"),
         (npz, ("--tone", "edges"), "--tone means nothing for the events"),
         (video, ("--size", 10, 10), "leave out --size"),
-        (frames, ("--dt", "1/60", "--representation", "count"), "--dt and --representation means nothing"),
+        (frames, ("--dt", "1/60", "--representation", "count"), "--dt and --representation mean nothing"),
         (frames, ("--size", 10, 10), "leave out --size"),
     ):
         assert wanted in fault(capsys, "images", source, *flags, "-o", tmp_path / "t")

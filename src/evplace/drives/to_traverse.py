@@ -280,8 +280,11 @@ def _check_kind(kind: Kind | None, path: str, settings: Mapping[str, Any]) -> No
     """SettingsError where a setting is named that means nothing for camera images, or for events."""
     idle = [name for name in settings if name in (OF_EVENTS if kind == "frames" else ("tone",))]
     if idle:
+        named = " and ".join(f"`{name}`" for name in idle)
         what, hint = ("camera images", ", or add `kind=events`") if kind == "frames" else ("events", "")
-        raise SettingsError(f"`{idle[0]}` means nothing for the {what} of {path}: leave it out{hint}")
+        raise SettingsError(
+            f"{named} mean{'s' * (len(idle) == 1)} nothing for the {what} of {path}: leave it out{hint}"
+        )
 
 
 def _refuse(what: str, arguments: Mapping[str, object]) -> None:
