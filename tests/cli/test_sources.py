@@ -91,10 +91,10 @@ def test_the_settings_that_are_shown_are_those_of_the_data_set(tmp_path: Path, c
 def test_a_video_is_simulated_or_kept(tmp_path: Path, capsys: Capture) -> None:
     video, out = write_video(tmp_path / "film.mp4"), tmp_path / "t"
     assert said(capsys, "images", video, "-o", out)["shape"] == [90, 160]
-    assert info_of(out)["simulated"]["seed"] == 0
+    assert Traverse.load(out).info["simulated"]["seed"] == 0
     facts = said(capsys, "images", video, "-o", out, "--kind", "frames", "--overwrite")
     assert (facts["images"], facts["shape"]) == (12, [90, 160, 3])
-    assert info_of(out)["timed"]
+    assert Traverse.load(out).info["timed"]
 
 
 def test_a_query_is_made_as_its_map_was(tmp_path: Path, capsys: Capture) -> None:

@@ -100,7 +100,7 @@ def run(args: Args) -> int:
     result = evaluate(where, query, truth, args.rule, reference, args.answers, args.radius_m)
     result.save(args.out, args.overwrite, args.scores)
     with contextlib.suppress(MissingExtraError):  # a result is whole without its picture
-        curve_chart(result.curve, args.out / "pr_curve.png")
+        curve_chart(result, args.out / "pr_curve.png")
     if args.json:
         print_json(result.figures)
     else:

@@ -13,7 +13,7 @@ from evplace.core.errors import EvaluationError
 from evplace.evaluation import ItemImages, Result, measure, sample
 from evplace.evaluation.truth import Truth, by_cells, by_places, by_radius, only_views
 from evplace.imaging.traverse import Traverse
-from evplace.localizer import Answers, Localizer
+from evplace.localizer import Answered, Answers, Localizer
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns
 from evplace.sources.tracks import Track
@@ -48,19 +48,26 @@ def evaluate(
     place_map = localizer.map
     show = item_images(place_map, query, reference)
     truth = truth or truth_of(place_map, query, rule, radius_m)
-    answered = localizer.answers(query, answers)
+    result = judged(localizer, query, localizer.answers(query, answers), truth, answers)
+    result = dataclasses.replace(result, took_s=round(time.perf_counter() - started, 3))
+    return sample(result, query.images, show) if show is not None else result
+
+
+def judged(
+    localizer: Localizer, query: Traverse, answered: Answered, truth: Truth, answers: Answers
+) -> Result:
+    """The figures of what `localizer` has answered, by one truth."""
+    place_map = localizer.map
     settings = {
         "answers": answers,
         "map": place_map.settings,
         "matcher": localizer.settings,
         "query": query.info.get("source"),
     }
-    result = measure(
+    return measure(
         answered.path, truth, answered.rows, place_map.items.position, query.t_us, settings,
         xy_in(place_map, query), answered.delay,
     )  # fmt: skip
-    result = dataclasses.replace(result, took_s=round(time.perf_counter() - started, 3))
-    return sample(result, query.images, show) if show is not None else result
 
 
 def truth_of(

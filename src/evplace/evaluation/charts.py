@@ -65,7 +65,7 @@ def accuracy_chart(rows: Sequence[Mapping[str, Any]], path: str | Path) -> None:
         axes.plot([place - 0.45, place + 0.45], [chance, chance], color="black", linestyle=":", label="_")
     axes.plot([], [], color="black", linestyle=":", label="chance")
     axes.set_xticks(range(len(queries)), queries)
-    axes.set_title("The map is day-1; the query as named")
+    axes.set_title("Live answers; the map is day-1, the query as named")
     axes.legend(frameon=False, ncols=2)
     save(figure, path)
 
@@ -100,9 +100,9 @@ def bars_chart(groups: Mapping[str, Sequence[Mapping[str, Any]]], path: str | Pa
     save(figure, path)
 
 
-def curve_chart(curve: NDArray[np.float64], path: str | Path) -> None:
-    """A result's precision-recall curve (thresholds, 4), as a .png. Raises MissingExtraError."""
-    curves_chart("", [("", curve[:, [2, 1]], 0, "solid")], path)
+def curve_chart(result: Result, path: str | Path) -> None:
+    """A result's precision-recall curve, as a .png. Raises MissingExtraError."""
+    curves_chart(f"answers: {result.timing}", [("", result.curve[:, [2, 1]], 0, "solid")], path)
 
 
 def curves_chart(title: str, curves: Sequence[Curve], path: str | Path) -> None:

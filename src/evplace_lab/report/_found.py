@@ -28,6 +28,8 @@ class TableRow:
     database: str = ""
     sensor: str = ""
     rule: str = "places"
+    answers: str = "hindsight"
+    """"live" or "hindsight", which is what tables held before they said so."""
     spread: float | None = None
     seeds: int | None = None
     seen: float | None = None
@@ -63,6 +65,8 @@ class Curve:
     input: str = ""
     sensor: str = ""
     matcher: str = ""
+    answers: str = "hindsight"
+    """As in TableRow."""
     parameter: str = "threshold"
     average_precision: float | None = None
     spread: float | None = None

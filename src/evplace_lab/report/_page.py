@@ -104,6 +104,7 @@ def _data(found: Found, drawn: list[Panel]) -> dict[str, Any]:
 def _result(name: str, result: Result, positions: _Positions, shown: Shown) -> dict[str, Any]:
     return {
         "name": name,
+        "answers": _tables.TIMINGS.get(result.timing, result.timing),
         "figures": {key: _rounded(value) for key, value in result.figures.items()},
         "settings": flat(result.settings),
         "versions": result.versions,

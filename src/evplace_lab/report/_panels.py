@@ -68,7 +68,8 @@ def panels(found: Found) -> list[Panel]:
 def result_line(label: str, result: Result) -> Line:
     """A result's exact curve, without points that nobody could see apart."""
     points = [(recall, precision, value) for value, precision, recall, _ in result.curve.tolist()]
-    return Line(label, _visible(points), "threshold", result.figures["average_precision"])
+    average = result.figures["average_precision"]
+    return Line(f"{label}, {result.timing}", _visible(points), "threshold", average)
 
 
 def _panel(name: str, curves: Sequence[Curve], papers: Sequence[PaperCurve]) -> Panel:
@@ -87,7 +88,7 @@ def _line(curve: Curve, beside: Sequence[Curve], methods: list[str]) -> Line:
     several = sum(name == curve.input for name, _ in kinds) > 1
     sensor = f" ({curve.sensor})" if several else ""
     return Line(
-        label=f"{curve.input}{sensor}, {curve.matcher}".removeprefix(", "),
+        label=f"{curve.input}{sensor}, {curve.matcher}, {curve.answers}".removeprefix(", "),
         points=_known((point[1], point[2], point[0]) for point in curve.points),
         parameter=curve.parameter,
         average_precision=curve.average_precision,

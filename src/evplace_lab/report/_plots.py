@@ -53,7 +53,7 @@ def _bars(rows: tuple[TableRow, ...]) -> dict[str, list[dict[str, object]]]:
         several = len({other.sensor for other in chosen if other.input == row.input}) > 1
         label = f"{row.input}, {row.sensor}" if several else row.input
         bar = {"query": row.query, "label": label, "mean": row.mean, "spread": row.spread, "paper": row.paper}
-        groups.setdefault(row.matcher, []).append(bar)
+        groups.setdefault(f"{row.matcher}, {row.answers}", []).append(bar)
     return groups
 
 

@@ -15,6 +15,8 @@ RULES = {
     "view": "the rule of views: also a reference near by that looks the same way",
 }
 """Rule -> what it means."""
+TIMINGS = {"live": "live", "hindsight": "in hindsight"}
+"""When answers were given -> how a page says it."""
 OVERVIEW = {
     "accuracy": "accuracy", "accuracy_seen": "seen only", "rejection_rate": "rejected",
     "precision": "precision", "recall": "recall", "average_precision": "AP", "recall@1": "recall@1",
@@ -37,8 +39,10 @@ def accuracies(rows: Sequence[TableRow]) -> Html:
     blocks = []
     for number, rule in enumerate(rules):
         of_rule = [row for row in rows if row.rule == rule]
-        matchers = dict.fromkeys(row.matcher for row in of_rule)
-        tables = [_block(matcher, [row for row in of_rule if row.matcher == matcher]) for matcher in matchers]
+        kinds = dict.fromkeys((row.matcher, row.answers) for row in of_rule)
+        tables = [
+            _block(*kind, [row for row in of_rule if (row.matcher, row.answers) == kind]) for kind in kinds
+        ]
         blocks.append(tag("div", *tables, class_="rule", data_rule=rule, hidden=number > 0))
     return join(_rule_switch(rules), _legend(rows), *blocks)
 
@@ -72,11 +76,13 @@ def overview(results: Mapping[str, Result]) -> Html:
         key for key in OVERVIEW if any(result.figures.get(key) is not None for result in results.values())
     ]
     heads = ("queries", *(OVERVIEW[key] for key in shown), "took")
-    head = tag("thead", tag("tr", tag("th", "result", scope="col"), *map(_number_head, heads)))
+    words = [tag("th", word, scope="col") for word in ("result", "answers")]
+    head = tag("thead", tag("tr", *words, *map(_number_head, heads)))
     body = [
         tag(
             "tr",
             tag("th", name, scope="row"),
+            tag("td", TIMINGS.get(result.timing, result.timing)),
             _number(f"{len(result.judged):,}"),
             *(_number(percent(result.figures.get(key))) for key in shown),
             _number("–" if result.took_s is None else f"{result.took_s:.3g} s"),
@@ -115,7 +121,7 @@ def _headline_figures(found: Found) -> list[tuple[str, str, str]]:
 
 def _of_table(rows: Sequence[TableRow]) -> list[tuple[str, str, str]]:
     """The first input by the paper's own matcher beside colour, and how often it beats it."""
-    of_rule = [row for row in rows if row.rule == rows[0].rule]
+    of_rule = [row for row in rows if (row.rule, row.answers) == (rows[0].rule, rows[0].answers)]
     matchers = [row.matcher for row in of_rule]
     matcher = "Algorithm 1" if "Algorithm 1" in matchers else matchers[0]
     main, *others = dict.fromkeys(row.input for row in of_rule)
@@ -129,7 +135,7 @@ def _of_table(rows: Sequence[TableRow]) -> list[tuple[str, str, str]]:
         remarks = [f"{rival} {case[rival].mean:.1f}"] if rival in case else []
         remarks += [] if row.paper is None else [f"paper {row.paper:.1f}"]
         value = f"{_with_spread(row.mean, row.spread)} %"
-        tiles.append((value, f"{row.query}, {main}, {matcher}", ", ".join(remarks)))
+        tiles.append((value, f"{row.query}, {main}, {matcher}, {row.answers}", ", ".join(remarks)))
     pairs = [(case[main], case[rival]) for case in cases.values() if rival in case and main in case]
     if pairs:
         wins = sum(one.mean > other.mean for one, other in pairs)
@@ -184,8 +190,8 @@ def _legend(rows: Sequence[TableRow]) -> Html:
     )
 
 
-def _block(matcher: str, rows: Sequence[TableRow]) -> Html:
-    """A matcher's table: a row for each database and query, columns for each input and sensor."""
+def _block(matcher: str, answers: str, rows: Sequence[TableRow]) -> Html:
+    """A matcher's live answers, or hindsight: a row a database and query, columns for input and sensor."""
     kinds = list(dict.fromkeys(_kind(row) for row in rows))
     printed = {_kind(row) for row in rows if row.paper is not None}
     chance = any(row.chance is not None for row in rows)
@@ -203,9 +209,9 @@ def _block(matcher: str, rows: Sequence[TableRow]) -> Html:
         body.append(tag("tr", tag("th", query, scope="row"), first, *cells, last))
     learned = f" (database {next(iter(databases))})" if len(databases) == 1 and any(databases) else ""
     words = ("query", "database") if len(databases) > 1 else ("query",)
-    caption = tag("caption", matcher, tag("small", learned))
+    caption = tag("caption", f"{matcher}, {TIMINGS.get(answers, answers)}", tag("small", learned))
     head = join(caption, _block_head(words, kinds, printed, chance))
-    return _scrolled(matcher, tag("table", head, tag("tbody", *body)))
+    return _scrolled(f"{matcher}, {answers}", tag("table", head, tag("tbody", *body)))
 
 
 def _block_head(

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import MissingExtraError
 from evplace.core.workers import serve
-from evplace.evaluation import Result, measure, sample
-from evplace.evaluation._evaluate import item_images, xy_in
+from evplace.evaluation import Result, sample
+from evplace.evaluation._evaluate import item_images, judged
 from evplace.evaluation.sweeps import sweep
 from evplace.evaluation.truth import Truth
 from evplace.imaging.traverse import Traverse
@@ -99,14 +99,27 @@ def _answer(
         rows[timing] = answered.rows
         found[timing] = _by_rules(case, where, query, answered, truths, timing)
         if case.keep and timing == "live":
-            settings = {"key": runs.key(case), "answers": timing, **_settings(where)}
-            result = _measured(where, query, answered, next(iter(truths.values())), settings)
-            show = item_images(place_map, query, day)
-            assert show is not None  # the map's drive lends its images
-            sample(result, query.images, show).save(runs.result_folder(case), overwrite=True)
+            _keep(
+                case,
+                judged(where, query, answered, next(iter(truths.values())), timing),
+                place_map,
+                query,
+                day,
+                runs,
+            )
     taken = {"cpu_s": round(time.process_time() - began, 2)}
     taken["train_cpu_s"] = place_map.info.get("train_cpu_s", 0.0)
     runs.keep(case, {**found, **taken})
+
+
+def _keep(
+    case: Case, result: Result, place_map: PlaceMap, query: Traverse, day: Traverse, runs: Runs
+) -> None:
+    """Keep a whole result, with images of some matches."""
+    show = item_images(place_map, query, day)
+    assert show is not None  # the map's drive lends its images
+    known = dataclasses.replace(result, settings=result.settings | {"key": runs.key(case)})
+    sample(known, query.images, show).save(runs.result_folder(case), overwrite=True)
 
 
 def _by_rules(
@@ -120,22 +133,11 @@ def _by_rules(
     """Rule -> figures, and by the first rule, which is the paper's, the curve where it is wanted."""
     found: dict[str, Any] = {}
     for rule, truth in truths.items():
-        result = _measured(where, query, answered, truth, {})
+        result = judged(where, query, answered, truth, timing)
         found[rule] = {"figures": result.figures}
         if case.swept and len(found) == 1:
             found[rule]["curve"] = _curve(where, answered.rows, query, result, truth.right, timing).tolist()
     return found
-
-
-def _measured(
-    where: Localizer, query: Traverse, answered: Answered, truth: Truth, settings: dict[str, Any]
-) -> Result:
-    positions, xy = where.map.items.position, xy_in(where.map, query)
-    return measure(answered.path, truth, answered.rows, positions, query.t_us, settings, xy, answered.delay)
-
-
-def _settings(where: Localizer) -> dict[str, Any]:
-    return {"map": where.map.settings, "matcher": where.settings}
 
 
 def _curve(

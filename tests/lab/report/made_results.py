@@ -26,7 +26,7 @@ def make_result(seed: int = 0, queries: int = 60, size: tuple[int, ...] = (12, 1
     item[lost] = rng.integers(0, 20, lost.sum())
     score = np.where(lost, 0.4, 0.8) + 0.2 * rng.random(queries)
     answers = Answers(item, score, score > 0.5)
-    settings = {"matcher": {"name": "local", "K": 5}, "scorer": "network"}
+    settings = {"answers": "live", "matcher": {"name": "local", "K": 5}, "scorer": "network"}
     right = truth.by_radius(here, there, 12.0)
     made = measure(answers, right, None, there, np.arange(queries), settings, here)
     images = rng.integers(0, 255, (queries, *size), np.uint8)
@@ -38,6 +38,7 @@ def table2() -> dict[str, object]:
     rows = [
         {
             "database": "day-1", "query": query, "input": kind, "sensor": sensor, "matcher": matcher,
+            "answers": "live",
             "rule": rule,
             "mean": 90.0 - 9 * number - (30 if kind == "colour" else 0) - (10 if rule == "view" else 0),
             "spread": 1.5, "seeds": 3, "values": [], "seen": 88.25, "rejected": 3.5, "chance": 4.0,
@@ -64,6 +65,7 @@ def figure5() -> dict[str, object]:
             curves.append(
                 {
                     "panel": panel, "query": query, "input": kind, "sensor": "ideal", "matcher": matcher,
+            "answers": "live",
                     "parameter": "tau1", "points": points, "average_precision": 0.8 - number * 0.3,
                     "spread": 0.01, "seeds": 3,
                 }

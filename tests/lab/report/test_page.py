@@ -42,7 +42,7 @@ def inlined(text: str) -> dict[str, Any]:
 def test_every_part_is_there(run: Found) -> None:
     text = page(run)
     for words in (
-        "Table 2: events and colour", "Algorithm 1", "90.0 ± 1.5", "85.8", "seen 88.2", "rejected 3.5",
+        "Table 2: events and colour", "Algorithm 1, live", "90.0 ± 1.5", "85.8", "seen 88.2", "rejected 3.5",
         'data-rule="view" hidden', "10 of 10", "▲ better", "▼ worse", "= no effect seen", "321",
         "train.steps", "<title>run</title>",
     ):  # fmt: skip

@@ -168,7 +168,7 @@ def test_real_sets_are_judged_by_their_own_truth(data: Path, out: Path) -> None:
 
 
 def test_real_sets_that_are_not_there_are_told(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="give the folder that holds them with --data"):
+    with pytest.raises(InputError, match="give the folder that holds them with `data`"):
         reproduce("real", tmp_path / "out")
     with pytest.raises(InputError, match="holds none of the real sets"):
         reproduce("real", tmp_path / "out", data=tmp_path)
