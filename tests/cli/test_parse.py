@@ -388,6 +388,22 @@ def test_nothing_is_done_where_settings_are_shown(tmp_path: Path, toml: Path, ca
     assert main(words) == 0
 
 
+def test_settings_of_parts_are_checked_before_the_work(tmp_path: Path, capsys: Capture) -> None:
+    for words in (
+        ("train", "none.aedat4", "-o", tmp_path / "m", "--scorer", "ncc", "--set", "width=wide"),
+        ("evaluate", "none.evp", "none.aedat4", "-o", tmp_path / "r", "--set", "K=wide"),
+        ("simulate", "none.mp4", "-o", tmp_path / "s.npz", "--set", "threshold_on=wide"),
+    ):
+        assert "cannot be 'wide'" in fault(capsys, *words)
+
+
+def test_words_after_two_dashes_are_no_flags() -> None:
+    args = args_of("images", "-o", "x", "--dt", "1/30", "--", "--width")
+    assert args.source == Path("--width")
+    assert "dt" in args.given
+    assert "width" not in args.given
+
+
 def test_nan_is_refused_by_its_flag(capsys: Capture) -> None:
     for words, flag in (
         (("train", "--cell-m", "nan"), "--cell-m"),
