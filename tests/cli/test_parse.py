@@ -199,6 +199,8 @@ def test_the_help_shows_all_parts_and_presets(capsys: Capture, monkeypatch: pyte
     monkeypatch.setenv("COLUMNS", "400")
     for command, family in (
         ("train", "scorers"),
+        ("images", "datasets"),
+        ("doctor", "datasets"),
         *((c, "matchers") for c in ("localize", "evaluate", "match")),
     ):
         with pytest.raises(SystemExit):
@@ -206,7 +208,7 @@ def test_the_help_shows_all_parts_and_presets(capsys: Capture, monkeypatch: pyte
         told = capsys.readouterr().out
         assert f"{{{','.join(families.names(family))}}}" in told
         for part in families.names(family):
-            assert all(preset in told for preset in families.settings_of(family, part)[1])
+            assert all(preset in told for preset in getattr(families.load(family, part), "PRESETS", ()))
 
 
 @pytest.mark.parametrize(
