@@ -199,6 +199,8 @@ def test_the_help_shows_all_parts_and_presets(capsys: Capture, monkeypatch: pyte
     monkeypatch.setenv("COLUMNS", "400")
     for command, family in (
         ("train", "scorers"),
+        ("images", "datasets"),
+        ("doctor", "datasets"),
         *((c, "matchers") for c in ("localize", "evaluate", "match")),
     ):
         with pytest.raises(SystemExit):
@@ -206,7 +208,7 @@ def test_the_help_shows_all_parts_and_presets(capsys: Capture, monkeypatch: pyte
         told = capsys.readouterr().out
         assert f"{{{','.join(families.names(family))}}}" in told
         for part in families.names(family):
-            assert all(preset in told for preset in families.settings_of(family, part)[1])
+            assert all(preset in told for preset in getattr(families.load(family, part), "PRESETS", ()))
 
 
 @pytest.mark.parametrize(
@@ -391,6 +393,22 @@ def test_nothing_is_done_where_settings_are_shown(tmp_path: Path, toml: Path, ca
     assert "default" in told
     assert not (tmp_path / "m.csv").exists()
     assert main(words) == 0
+
+
+def test_settings_of_parts_are_checked_before_the_work(tmp_path: Path, capsys: Capture) -> None:
+    for words in (
+        ("train", "none.aedat4", "-o", tmp_path / "m", "--scorer", "ncc", "--set", "width=wide"),
+        ("evaluate", "none.evp", "none.aedat4", "-o", tmp_path / "r", "--set", "K=wide"),
+        ("simulate", "none.mp4", "-o", tmp_path / "s.npz", "--set", "threshold_on=wide"),
+    ):
+        assert "cannot be 'wide'" in fault(capsys, *words)
+
+
+def test_words_after_two_dashes_are_no_flags() -> None:
+    args = args_of("images", "-o", "x", "--dt", "1/30", "--", "--width")
+    assert args.source == Path("--width")
+    assert "dt" in args.given
+    assert "width" not in args.given
 
 
 def test_nan_is_refused_by_its_flag(capsys: Capture) -> None:

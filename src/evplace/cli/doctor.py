@@ -17,11 +17,12 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, in_flags, note, print_json
+from evplace.cli._settings import a_part_of
 from evplace.cli._track import TrackFlags
 from evplace.doctor import STATES, Examination, Finding, as_json, check_drawing, draw, examine
 
@@ -47,7 +48,7 @@ class Args(TrackFlags):
     """For a folder of images without timestamps.txt: images a second, 30 unless given."""
     drive: str | None = None
     """For a data set: which drive."""
-    dataset: str | None = None
+    dataset: Annotated[str | None, a_part_of("datasets")] = None
     """For a data set that is not recognised by its layout: its name."""
     report: Path | None = None
     """Also write a folder of pictures and findings.json."""

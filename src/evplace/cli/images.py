@@ -22,6 +22,7 @@ import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
 from evplace.cli._recipe import recipe_settings
+from evplace.cli._settings import a_part_of
 from evplace.cli._track import TrackFlags
 from evplace.core.storage import check_new_file
 from evplace.drives.datasets import Drive
@@ -48,7 +49,7 @@ class Args(TrackFlags):
     """Unit of the times, where the file does not say."""
     drive: str | None = None
     """For a data set: which drive."""
-    dataset: str | None = None
+    dataset: Annotated[str | None, a_part_of("datasets")] = None
     """For a data set that is not recognised by its layout: its name."""
     kind: Literal["events", "frames"] | None = None
     """events: simulate them where there are only images (as is done for videos and data sets of films);
