@@ -367,7 +367,8 @@ def test_a_training_that_was_stopped_goes_on(folder: Path, how: signal.Signals) 
     day = ["train", folder / "day.aedat4", "--track", folder / "day.csv", "--batch", "8"]
     command = [*map(str, [*day, "--steps", "60"]), "-o"]
     waiting, pipe = [sys.executable, "-c", WAITS_ONCE_SAVED, *command, folder / "stopped"], subprocess.PIPE
-    with subprocess.Popen(waiting, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
+    alone = {**os.environ, "OMP_NUM_THREADS": "1"}  # more threads wait for each other on a busy machine
+    with subprocess.Popen(waiting, stdin=pipe, stdout=pipe, stderr=pipe, text=True, env=alone) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "saved\n"
         process.send_signal(how)
@@ -378,7 +379,7 @@ def test_a_training_that_was_stopped_goes_on(folder: Path, how: signal.Signals) 
     assert not (folder / "stopped").exists()
     for name in ("stopped", "whole"):
         again = [sys.executable, "-m", "evplace", *command, folder / name]
-        subprocess.run(again, check=True, capture_output=True)
+        subprocess.run(again, check=True, capture_output=True, env=alone)
     stopped, whole = ((folder / name / "network.onnx").read_bytes() for name in ("stopped", "whole"))
     assert stopped == whole
     assert not (folder / ".stopped.checkpoint").exists()

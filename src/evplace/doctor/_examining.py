@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import DamagedRecordingError, InputError, TrackError
 from evplace.core.events import Events, Size
 from evplace.doctor._outcome import STATES, Examination, Finding, Outcome
@@ -70,7 +70,7 @@ def _film(film: Film, windows: WindowSettings, track: Track | None) -> Examinati
 
 
 def _examined(subject: Subject, film: Film | None = None) -> Examination:
-    parts = [plugs.load("doctor", name) for name in plugs.names("doctor")]
+    parts = [families.load("doctor", name) for name in families.names("doctor")]
     checks: list[Check] = [part.Check(subject) for part in parts if subject.kind in part.OF]
     for part in _events(subject) if film is None else _frames(subject, film):
         for check in checks:

@@ -21,8 +21,7 @@ from typing import Annotated
 import tyro
 
 from evplace.cli._output import print_json, print_table, progress
-from evplace.core import families as plugs
-from evplace.core import settings
+from evplace.core import families, settings
 from evplace_lab.reproduction import Choice, reproduce
 
 
@@ -58,7 +57,7 @@ def run(args: Args) -> int:
     if args.json:
         print_json(document)
         return 0
-    for table in plugs.load("reproduction", args.name).tables(document):
+    for table in families.load("reproduction", args.name).tables(document):
         print_table(*table)
     minutes = document["cpu_s"] / 60
     print(f"Kept in {args.out}/{args.name}.json, {minutes:.1f} minutes of one core in all")

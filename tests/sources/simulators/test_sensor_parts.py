@@ -20,9 +20,9 @@ from evplace.sources.simulators.esim import (
     PRESETS,
     SensorSettings,
     Simulator,
+    _Buffer,
     _counted,
     _looked_up,
-    _Room,
     log_light,
     log_table,
     simulate,
@@ -99,24 +99,24 @@ def test_counting_sorts_as_a_stable_sort_does(seed: int, span: int, count: int) 
 
 @pytest.mark.parametrize("span", [1000, _BUCKETS - 1, _BUCKETS, 3_000_000])
 def test_short_and_long_intervals_are_sorted_alike(span: int) -> None:
-    rng, room = np.random.default_rng(1), _Room(0)
+    rng, buffer = np.random.default_rng(1), _Buffer(0)
     dt = rng.integers(1, span + 1, 500)
     dt[100:200] = dt[0]
     x, y = rng.integers(0, 9, 500), rng.integers(0, 9, 500)
-    room.put(0, dt, x, y, rng.random(500) < 0.5)
-    events = room.sorted(500, 70, 70 + span, (9, 9))
+    buffer.put(0, dt, x, y, rng.random(500) < 0.5)
+    events = buffer.sorted(500, 70, 70 + span, (9, 9))
     order = np.argsort(dt, kind="stable")
     np.testing.assert_array_equal(events.t_us, 70 + dt[order])
     np.testing.assert_array_equal(events.x, x[order])
     np.testing.assert_array_equal(events.y, y[order])
 
 
-def test_room_grows_and_keeps_what_is_in_it() -> None:
-    room = _Room(10)
+def test_a_buffer_grows_and_keeps_what_is_in_it() -> None:
+    buffer = _Buffer(10)
     first = np.arange(4000)
-    room.put(0, first, first % 7, first % 5, first % 2 == 0)
-    room.put(4000, first, first % 3, first % 2, first % 3 == 0)
-    dt, x, y, p = (array[:8000] for array in room.arrays)
+    buffer.put(0, first, first % 7, first % 5, first % 2 == 0)
+    buffer.put(4000, first, first % 3, first % 2, first % 3 == 0)
+    dt, x, y, p = (array[:8000] for array in buffer.arrays)
     np.testing.assert_array_equal(dt, np.tile(first, 2))
     np.testing.assert_array_equal(x[:4000], first % 7)
     np.testing.assert_array_equal(y[4000:], first % 2)
