@@ -8,8 +8,7 @@ from typing import Literal
 
 import pytest
 
-from evplace.core import families as plugs
-from evplace.core import settings
+from evplace.core import families, settings
 from evplace.core.errors import SettingsError
 
 
@@ -72,7 +71,7 @@ def test_files(tmp_path: Path) -> None:
 
 
 def test_families_are_their_folders() -> None:
-    assert plugs.names("scorers") == ["cosine", "ncc", "network", "notebook", "sad", "seqslam"]
-    assert plugs.load("scorers", "ncc").__name__ == "evplace.scorers.ncc"
+    assert families.names("scorers") == ["cosine", "ncc", "network", "notebook", "sad", "seqslam"]
+    assert families.load("scorers", "ncc").__name__ == "evplace.scorers.ncc"
     with pytest.raises(SettingsError, match="known are cosine"):
-        plugs.load("scorers", "_ncc")
+        families.load("scorers", "_ncc")

@@ -10,13 +10,13 @@ import pytest
 from examined import SIZE, noise, outcome, road
 
 from conftest import make_drive, write_drive
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import InputError, OutputError, SettingsError, TrackError
 from evplace.core.events import Events
 from evplace.doctor import STATES, Examination, as_json, draw, examine
 from evplace.sources.writers import write_recording
 
-PARTS = [plugs.load("doctor", name) for name in plugs.names("doctor")]
+PARTS = [families.load("doctor", name) for name in families.names("doctor")]
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.__name__.rpartition(".")[2])
@@ -55,10 +55,10 @@ def test_the_worst_comes_first_and_json_is_finite(tmp_path: Path) -> None:
     order = [STATES.index(finding.state) for finding in found.findings]
     assert order == sorted(order)
     assert found.findings[0].name == "GPS coverage"
-    said = as_json(found)
-    assert json.loads(json.dumps(said, allow_nan=False)) == said
-    assert len({finding["name"] for finding in said["findings"]}) == len(said["findings"])
-    for finding in said["findings"]:
+    written = as_json(found)
+    assert json.loads(json.dumps(written, allow_nan=False)) == written
+    assert len({finding["name"] for finding in written["findings"]}) == len(written["findings"])
+    for finding in written["findings"]:
         assert finding["sentence"].endswith(".")
         assert (finding["state"] in ("good", "unknown")) == (not finding["advice"])
 

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import ScoresError, SettingsError
 from evplace.core.settings import to_dict
 from evplace.matchers import Path, open_matcher
 
-NAMES = plugs.names("matchers")
-PRESETS = [(name, preset) for name in NAMES for preset in [None, *plugs.load("matchers", name).PRESETS]]
+NAMES = families.names("matchers")
+PRESETS = [(name, preset) for name in NAMES for preset in [None, *families.load("matchers", name).PRESETS]]
 
 
 def assert_same(one: Path, other: Path) -> None:
@@ -105,7 +105,7 @@ def test_one_reference_and_ties_are_answered(name, preset) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_settings_are_saved_and_unknown_ones_refused(name) -> None:
-    module = plugs.load("matchers", name)
+    module = families.load("matchers", name)
     assert module.Settings(**to_dict(module.Settings())) == module.Settings()
     with pytest.raises(SettingsError, match="unknown setting"):
         open_matcher(name, colour="red")

@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 
 import made_sets
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import DatasetError, RecordingError, SettingsError
 from evplace.drives.datasets import drives, matching, open_drive
 from evplace.drives.to_traverse import open_source, open_traverse
 from made_sets import write_gta, write_robotcar
 
 MAKERS: dict[str, Callable[[Path], object]] = {
-    name: getattr(made_sets, f"write_{name}") for name in plugs.names("datasets")
+    name: getattr(made_sets, f"write_{name}") for name in families.names("datasets")
 }
 """`made_sets` has a maker for each."""
 
@@ -34,10 +34,10 @@ def test_each_layout_is_recognised_by_its_own_set_alone(tmp_path: Path, name: st
 
 @pytest.mark.parametrize("name", sorted(MAKERS))
 def test_each_says_where_it_comes_from(name: str) -> None:
-    about = inspect.getdoc(plugs.load("datasets", name)) or ""
+    about = inspect.getdoc(families.load("datasets", name)) or ""
     for word in ("itation", "icence", "ddress", "ayout"):
         assert word in about
-    assert "\n" not in plugs.load("datasets", name).NEEDS
+    assert "\n" not in families.load("datasets", name).NEEDS
 
 
 def test_folders_that_are_no_set_or_several(tmp_path: Path) -> None:

@@ -83,6 +83,14 @@ def test_from_afar_a_road_is_nearly_even(s: float, t: float, footprint: float) -
     assert abs(colour[0] - near[0]) < 0.02
 
 
+@given(share, share)
+def test_grain_has_faded_where_it_is_left_out(s: float, t: float) -> None:
+    with_grain, without = (
+        materials.road(tile(60.0, 40.0), s, t, footprint, footprint, 0.0)[0] for footprint in (1.999, 2.001)
+    )
+    assert abs(with_grain - without) < 0.003
+
+
 def test_slabs_have_joints_every_nine_decimetres() -> None:
     plain = look(0.3, 0.3, 0.3, 0.0, 0.0, 9.0, 9.0)
     joints, slabs = (

@@ -114,6 +114,7 @@ def test_halts_lie_before_their_crossings_in_the_order_of_the_way(path: int) -> 
     route = lay_route(path, STREETS, FLAT, 0, None)
     ways = [halt.at_m for halt in route.halts]
     assert ways == sorted(ways)
+    assert len(ways) > 15
     for halt in route.halts:
         here = route.position[round(halt.at_m / STEP_M), :2]
         middle = np.array([STREETS.x[halt.crossing[0]], STREETS.y[halt.crossing[1]]])

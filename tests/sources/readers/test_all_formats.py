@@ -15,7 +15,7 @@ import pytest
 from made import MAKERS, SIZE, some_events
 
 from conftest import HANG_S
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import DamagedRecordingError, EvplaceError, RecordingError
 from evplace.core.events import Events
 from evplace.sources.readers import open_recording
@@ -32,7 +32,7 @@ in_this_process = pytest.mark.parametrize("form", sorted(set(MAKERS) - set(ISOLA
 
 
 def test_each_format_has_a_maker() -> None:
-    assert sorted(MAKERS) == plugs.names("readers")
+    assert sorted(MAKERS) == families.names("readers")
 
 
 def read_all(path: Path) -> tuple[list[Events], EvplaceError | None]:
@@ -108,11 +108,11 @@ def test_damage_that_the_decoder_may_not_survive(form: str, kind: str, tmp_path:
         worker = [sys.executable, str(Path(damage.__file__)), *arguments]
         try:
             answer = subprocess.run(worker, capture_output=True, text=True, timeout=HANG_S + count)
-            said, survived = answer.stdout, answer.returncode >= 0
+            output, survived = answer.stdout, answer.returncode >= 0
             assert answer.returncode <= 0, answer.stderr[-2000:]
         except subprocess.TimeoutExpired as late:
-            said, survived = (late.stdout or b"").decode(), False
-        first = int(said.split()[-1]) + 1
+            output, survived = (late.stdout or b"").decode(), False
+        first = int(output.split()[-1]) + 1
         if not survived:
             bad = tmp_path / f"bad{path.suffix}"
             bad.write_bytes(damage.damaged(data, kind, SEED, first - 1, count))

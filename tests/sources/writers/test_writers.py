@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evplace.core import families as plugs
+from evplace.core import families
 from evplace.core.errors import DamagedRecordingError, OutputError
 from evplace.core.events import Events
 from evplace.sources.readers import open_recording
 from evplace.sources.writers import write_recording
 
 SIZE = (240, 180)
-formats = pytest.mark.parametrize("form", plugs.names("writers"))
+formats = pytest.mark.parametrize("form", families.names("writers"))
 
 
 def some(count: int, start_us: int, span_us: int, seed: int = 0) -> Events:
@@ -43,7 +43,7 @@ def same(first: Events, second: Events) -> bool:
 )
 def test_round_trip(form: str, each: int, start_us: int, span_us: int, tmp_path: Path) -> None:
     events = some(5000, start_us, span_us)
-    path = tmp_path / f"made{plugs.load('writers', form).SUFFIX}"
+    path = tmp_path / f"made{families.load('writers', form).SUFFIX}"
     assert write_recording(path, packets(events, each), SIZE) == len(events)
     recording = open_recording(path)
     assert (recording.format, recording.size, recording.notes) == (form, SIZE, [])
@@ -54,7 +54,7 @@ def test_round_trip(form: str, each: int, start_us: int, span_us: int, tmp_path:
 def test_a_second_library_reads_the_same(form: str, tmp_path: Path) -> None:
     faery: Any = pytest.importorskip("faery")
     events = some(5000, 77, 3 << 24)
-    path = tmp_path / f"made{plugs.load('writers', form).SUFFIX}"
+    path = tmp_path / f"made{families.load('writers', form).SUFFIX}"
     write_recording(path, packets(events, 1000), SIZE)
     stream = faery.events_stream_from_file(path)
     theirs = np.concatenate(list(stream))
