@@ -136,9 +136,12 @@ def test_sums_too_large_for_whole_numbers_go_through_floats() -> None:
     np.testing.assert_allclose(Resampler(rows, columns).binary(canvas), 0.5, rtol=1e-6)
 
 
-@pytest.mark.parametrize(("n", "out"), [(240, 120), (360, 90), (960, 90)])
-def test_sums_stay_in_the_numbers_that_hold_them(n: int, out: int) -> None:
-    """A canvas that is set everywhere makes every sum as large as it can be."""
-    rows, columns = axis_map(n, n * 3 // 4, out, True, "area"), axis_map(n, n, out, True, "area")
-    image = Resampler(rows, columns).binary(np.full((n, n), -1, np.int8))
+@pytest.mark.parametrize(
+    ("rows", "columns"),
+    [((97, 64), (50, 33)), ((63, 40), (63, 40)), ((64, 40), (65, 40)), ((960, 90), (97, 64))],
+)
+def test_sums_stay_in_the_numbers_that_hold_them(rows: tuple[int, int], columns: tuple[int, int]) -> None:
+    """A canvas that is set everywhere makes every sum as large as it can be: on both sides of each limit."""
+    down, across = (axis_map(n, n, out, True, "area") for n, out in (rows, columns))
+    image = Resampler(down, across).binary(np.full((rows[0], columns[0]), -1, np.int8))
     np.testing.assert_allclose(image, 1.0, rtol=1e-6)

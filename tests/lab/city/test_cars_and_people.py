@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 import pytest
+from made_town import made_town
 
-from evplace_lab.city import build_town
 from evplace_lab.city.buildings import Lot
 from evplace_lab.city.drive import Drive, drive_along
 from evplace_lab.city.figures import STRIDES, car, person
@@ -32,7 +32,7 @@ from evplace_lab.city.traffic import (
 
 @pytest.fixture(scope="module")
 def town() -> Town:
-    return build_town(0)
+    return made_town()
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +69,8 @@ def test_oncoming_cars_come_towards_us_at_their_speed(traffic: Traffic) -> None:
     places = [middle(parts[0]) for parts in seen]
     wanted = [only._beside(200.0 - 9.0 * seconds, ONCOMING_M)[0][:2] for seconds in (2.0, 3.0)]
     np.testing.assert_allclose(places, wanted, atol=0.6)
+    _, yaw = only._beside(200.0 - 9.0 * 2.0, ONCOMING_M)
+    assert seen[0][0].frame[0, 3:5] @ (math.cos(yaw), math.sin(yaw)) < -4, "its side runs from front to rear"
     assert list(only._oncoming(pose, 20.0)) == [], "it has passed us"
     assert list(only._oncoming(pose._replace(way=40.0), 0.0)) == [], "too far ahead"
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_town import made_town
 
-from evplace_lab.city import build_town
 from evplace_lab.city.conditions import CONDITIONS, Condition
 from evplace_lab.city.light import (
     Light,
@@ -34,7 +34,7 @@ unit = st.floats(0.02, 1.0)
 
 @pytest.fixture(scope="module")
 def town() -> Town:
-    return build_town(0)
+    return made_town()
 
 
 @pytest.mark.parametrize("name", CONDITIONS)

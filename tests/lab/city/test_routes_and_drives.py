@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_town import made_town
 
-from evplace_lab.city import build_town
 from evplace_lab.city import drive as driving
 from evplace_lab.city.drive import Drive, Pose, camera_axes, drive_along
 from evplace_lab.city.routes import (
@@ -39,7 +39,7 @@ STREETS = Streets(np.arange(7) * 100.0, np.arange(7) * 100.0)
 
 @pytest.fixture(scope="module")
 def town() -> Town:
-    return build_town(0)
+    return made_town()
 
 
 @given(st.integers(3, 40), st.integers(0, 20))
@@ -139,17 +139,14 @@ def test_lights_of_a_crossing_take_turns(town: Town) -> None:
     np.testing.assert_array_equal(red[0, 48:], red[1, :-48])  # 48 quarters of a second: half a cycle
 
 
-@given(st.floats(0, 200), st.sampled_from([0, 1]))
-def test_a_wait_ends_at_green(seconds: float, axis: int) -> None:
-    signals = Signals(TOWN, np.random.default_rng(2))
-    crossing = (int(TOWN.signals[0, 0]), int(TOWN.signals[0, 1]))
+@given(seconds=st.floats(0, 200), axis=st.sampled_from([0, 1]))
+def test_a_wait_ends_at_green(town: Town, seconds: float, axis: int) -> None:
+    signals = Signals(town, np.random.default_rng(2))
+    crossing = (int(town.signals[0, 0]), int(town.signals[0, 1]))
     wait = signals.until_green(crossing, axis, seconds)
     assert 0 <= wait <= RED_S
     assert (wait > 0) == signals.red(crossing, axis, seconds)
     assert not signals.red(crossing, axis, seconds + wait + 1e-6)
-
-
-TOWN = build_town(0)
 
 
 def test_without_lights_nobody_waits(town: Town) -> None:
