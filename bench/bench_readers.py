@@ -410,8 +410,8 @@ def to_images(path: Path, rounds: int) -> None:
     speed, memory, answer = [], [], [0.0]
     for _ in range(rounds):
         command = [sys.executable, "-c", CHILD, str(path)]
-        said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-        answer = [float(word) for word in said.split()]
+        output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        answer = [float(word) for word in output.split()]
         speed.append(answer[0] / answer[2] / 1e6)
         memory.append(answer[3])
     print(

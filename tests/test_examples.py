@@ -35,8 +35,8 @@ def test_find_a_drive(tmp_path: Path, night_drive: Drive) -> None:
 def test_measure(tmp_path: Path, image_map: PlaceMap, night: Traverse) -> None:
     image_map.save(tmp_path / "street.evp")
     night.save(tmp_path / "night")
-    said = ran("measure.py", tmp_path / "street.evp", tmp_path / "night")
-    assert [line.split()[0] for line in said.splitlines()] == ["best", "hmm"]
+    output = ran("measure.py", tmp_path / "street.evp", tmp_path / "night")
+    assert [line.split()[0] for line in output.splitlines()] == ["best", "hmm"]
 
 
 def test_event_images(tmp_path: Path) -> None:

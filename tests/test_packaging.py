@@ -9,8 +9,8 @@ ROOT = Path(__file__).parents[1]
 
 
 def test_files_beside_the_code_are_packaged() -> None:
-    told = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    for name, patterns in told["tool"]["setuptools"]["package-data"].items():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    for name, patterns in project["tool"]["setuptools"]["package-data"].items():
         check(ROOT / "src" / name, patterns)
 
 

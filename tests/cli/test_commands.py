@@ -35,7 +35,7 @@ def street(files: Path) -> Path:
     return files / "street.evp"
 
 
-def said(capsys: Capture, *arguments: object) -> Any:
+def json_of(capsys: Capture, *arguments: object) -> Any:
     """What a command prints with --json."""
     capsys.readouterr()
     assert main([*map(str, arguments), "--json"]) == 0
@@ -43,7 +43,7 @@ def said(capsys: Capture, *arguments: object) -> Any:
 
 
 def test_info(files: Path, capsys: Capture) -> None:
-    facts = said(capsys, "info", files / "day.aedat4")
+    facts = json_of(capsys, "info", files / "day.aedat4")
     assert {"format", "width", "height", "events", "t_first_us", "t_last_us", "dropped"} <= set(facts)
     assert (facts["format"], facts["width"], facts["height"]) == ("aedat4", 80, 60)
     assert facts["events"] == len(make_drive().events)
@@ -55,11 +55,11 @@ def test_info(files: Path, capsys: Capture) -> None:
 def test_images(files: Path, tmp_path: Path, capsys: Capture) -> None:
     sheet = tmp_path / "sheet.png"
     out = ("images", files / "day.aedat4", "-o", tmp_path / "day", "--track", files / "day.csv")
-    facts = said(capsys, *out, "--sheet", sheet)
+    facts = json_of(capsys, *out, "--sheet", sheet)
     assert facts["images"] == 60
     assert facts["with_position"] == 60
     assert sheet.read_bytes().startswith(b"\x89PNG")
-    facts = said(capsys, *out, "--overwrite", "--dt", "1/15", "--width", "40")
+    facts = json_of(capsys, *out, "--overwrite", "--dt", "1/15", "--width", "40")
     assert (facts["images"], facts["shape"]) == (30, [90, 40])
 
 
@@ -67,8 +67,8 @@ def test_settings_come_from_a_file_and_flags_win(files: Path, tmp_path: Path, ca
     toml = tmp_path / "settings.toml"
     toml.write_text('[windows]\ndt = "1/15"\n[images]\nwidth = 40\nblur = false\n')
     out = ("images", files / "day.aedat4", "-o", tmp_path / "day", "--settings", toml)
-    assert said(capsys, *out)["shape"] == [90, 40]
-    assert said(capsys, *out, "--overwrite", "--width", "50")["shape"] == [90, 50]
+    assert json_of(capsys, *out)["shape"] == [90, 40]
+    assert json_of(capsys, *out, "--overwrite", "--width", "50")["shape"] == [90, 50]
     recipe = Traverse.load(tmp_path / "day").recipe
     assert recipe is not None
     assert (recipe.windows.dt, recipe.images.blur) == ("1/15", False)
@@ -85,10 +85,10 @@ def test_train_localize_evaluate_compare(files: Path, street: Path, tmp_path: Pa
     matches = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert [match["place"] for match in matches] == [int(line.split(",")[1]) for line in lines[1:]]
     query = ("evaluate", street, files / "night.aedat4", "--track", files / "night.csv")
-    figures = said(capsys, *query, "-o", tmp_path / "a.result", "--matcher", "best")
+    figures = json_of(capsys, *query, "-o", tmp_path / "a.result", "--matcher", "best")
     assert figures["accuracy"] > 0.95
-    said(capsys, *query, "-o", tmp_path / "b.result", "--matcher", "hmm", "--rule", "view")
-    rows = said(capsys, "compare", tmp_path / "a.result", tmp_path / "b.result")["results"]
+    json_of(capsys, *query, "-o", tmp_path / "b.result", "--matcher", "hmm", "--rule", "view")
+    rows = json_of(capsys, "compare", tmp_path / "a.result", tmp_path / "b.result")["results"]
     assert [row["result"] for row in rows] == ["a.result", "b.result"]
     assert rows[0]["matcher.name"] == "best"
     assert main(["compare", f"{tmp_path}/a.result", f"{tmp_path}/b.result"]) == 0
@@ -109,7 +109,7 @@ def test_a_traverse_is_answered_as_its_recording_is(
 def test_the_network_from_the_command_line(files: Path, tmp_path: Path, capsys: Capture) -> None:
     pytest.importorskip("torch", reason="the network needs the extra 'train'")
     out = ("train", files / "day.aedat4", "--track", files / "day.csv", "-o", tmp_path / "net.evp")
-    facts = said(capsys, *out, "--preset", "paper", "--steps", 3, "--batch", 8)
+    facts = json_of(capsys, *out, "--preset", "paper", "--steps", 3, "--batch", 8)
     assert (facts["scorer"], facts["items"]) == ("network", facts["places"])
     train = json.loads((tmp_path / "net.evp" / "map.json").read_text())["scorer"]["settings"]
     assert (train["last_relu"], train["steps"]) == (True, 3)
@@ -117,9 +117,9 @@ def test_the_network_from_the_command_line(files: Path, tmp_path: Path, capsys: 
 
 def test_without_positions_and_by_frames(files: Path, tmp_path: Path, capsys: Capture) -> None:
     out = ("train", files / "day.aedat4", "-o", tmp_path / "runs.evp", "--scorer", "sad")
-    assert said(capsys, *out, "--run-length", 10)["places"] == 6
+    assert json_of(capsys, *out, "--run-length", 10)["places"] == 6
     query = ("evaluate", tmp_path / "runs.evp", files / "night.aedat4", "--matcher", "best")
-    assert said(capsys, *query, "-o", tmp_path / "a", "--frames", 2)["accuracy"] > 0.9
+    assert json_of(capsys, *query, "-o", tmp_path / "a", "--frames", 2)["accuracy"] > 0.9
     for flags, words in (
         (("--frames", -3), "not -3"),
         (("--frames", 2, "--truth", "t.npy"), "give one of them"),
@@ -127,22 +127,22 @@ def test_without_positions_and_by_frames(files: Path, tmp_path: Path, capsys: Ca
         capsys.readouterr()
         assert main([*map(str, (*query, "-o", tmp_path / "b", *flags))]) == 2
         assert words in capsys.readouterr().err
-    assert said(capsys, *query, "-o", tmp_path / "b")["accuracy"] > 0.9
+    assert json_of(capsys, *query, "-o", tmp_path / "b")["accuracy"] > 0.9
     np.save(tmp_path / "truth.npy", np.eye(60))
-    assert said(capsys, *query, "-o", tmp_path / "c", "--truth", tmp_path / "truth.npy")["recall@1"] > 0.5
+    assert json_of(capsys, *query, "-o", tmp_path / "c", "--truth", tmp_path / "truth.npy")["recall@1"] > 0.5
 
 
 def test_convert_and_simulate_and_list(files: Path, tmp_path: Path, capsys: Capture) -> None:
-    assert said(capsys, "convert", files / "day.aedat4", tmp_path / "day.npz")["events"] > 0
-    assert said(capsys, "info", tmp_path / "day.npz")["format"] == "npz"
+    assert json_of(capsys, "convert", files / "day.aedat4", tmp_path / "day.npz")["events"] > 0
+    assert json_of(capsys, "info", tmp_path / "day.npz")["format"] == "npz"
     main(["images", f"{files}/day.aedat4", "-o", f"{tmp_path}/t"])
     from PIL import Image
 
     (tmp_path / "film").mkdir()
     for number, image in enumerate(np.load(tmp_path / "t" / "images.npy")[:4]):
         Image.fromarray(image).save(tmp_path / "film" / f"{number}.png")
-    assert said(capsys, "simulate", tmp_path / "film", "-o", tmp_path / "film.npz")["events"] > 0
-    assert "seqslam" in said(capsys, "list")["matchers"]
+    assert json_of(capsys, "simulate", tmp_path / "film", "-o", tmp_path / "film.npz")["events"] > 0
+    assert "seqslam" in json_of(capsys, "list")["matchers"]
 
 
 @pytest.mark.parametrize("command", sorted(commands()))
@@ -177,7 +177,7 @@ def test_a_folder_of_images_with_a_list(tmp_path: Path, capsys: Capture) -> None
         Image.fromarray(np.full((12, 16), number, np.uint8)).save(tmp_path / "film" / f"{number}.png")
     (tmp_path / "list.csv").write_text("name,index\n2.png,0\n0.png,1\n")
     command = ("images", tmp_path / "film", "-o", tmp_path / "t", "--list", tmp_path / "list.csv")
-    assert said(capsys, *command, "--fps", 10)["images"] == 2
+    assert json_of(capsys, *command, "--fps", 10)["images"] == 2
     assert np.load(tmp_path / "t" / "images.npy")[:, 0, 0].tolist() == [2, 0]
     assert np.load(tmp_path / "t" / "t_us.npy").tolist() == [0, 100_000]
 
@@ -188,7 +188,7 @@ def test_a_settings_file_may_say_a_default(tmp_path: Path, capsys: Capture) -> N
     command = ("images", tmp_path / "day.aedat4", "--settings", toml, "-o")
     for number, blur in enumerate((True, False)):
         toml.write_text(f"json = false\n[images]\nblur = {str(blur).lower()}\n[cleaning]\nmask_hot = false\n")
-        said(capsys, *command, tmp_path / f"{number}")
+        json_of(capsys, *command, tmp_path / f"{number}")
         recipe = Traverse.load(tmp_path / f"{number}").recipe
         assert recipe is not None
         assert recipe.images.blur is blur
@@ -201,9 +201,9 @@ def test_a_track_that_needs_settings(tmp_path: Path, capsys: Capture) -> None:
     odd = [f"{(int(t_us) - 5_000_000) / 1e6},{lat},{lon}" for t_us, lat, lon in rows]
     (tmp_path / "odd.csv").write_text("\n".join(["when,latitude,longitude", *odd]))
     command = ("images", tmp_path / "day.aedat4", "-o")
-    plain = said(capsys, *command, tmp_path / "plain", "--track", tmp_path / "day.csv")
+    plain = json_of(capsys, *command, tmp_path / "plain", "--track", tmp_path / "day.csv")
     flags = ("--track-preset", "robotcar", "--track-set", "time=when", "--track-set", "time_unit=s")
     shifted = ("--track", tmp_path / "odd.csv", *flags, "--track-offset", 5)
-    assert said(capsys, *command, tmp_path / "odd", *shifted) == plain
+    assert json_of(capsys, *command, tmp_path / "odd", *shifted) == plain
     tracks = [np.load(tmp_path / name / "track.npy") for name in ("plain", "odd")]
     np.testing.assert_allclose(*tracks)

@@ -33,18 +33,18 @@ def test_the_summary_comes_first_and_then_the_worst(day: Path, capsys: Capture) 
 
 def test_json(day: Path, capsys: Capture) -> None:
     assert main(["doctor", f"{day}/day.aedat4", "--track", f"{day}/day.csv", "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert set(said) == {"recording", "facts", "findings", "fault"}
-    assert set(said["findings"][0]) == {"name", "state", "value", "unit", "sentence", "advice"}
-    assert "GPS coverage" in {finding["name"] for finding in said["findings"]}
+    output = json.loads(capsys.readouterr().out)
+    assert set(output) == {"recording", "facts", "findings", "fault"}
+    assert set(output["findings"][0]) == {"name", "state", "value", "unit", "sentence", "advice"}
+    assert "GPS coverage" in {finding["name"] for finding in output["findings"]}
 
 
 def test_a_drive_of_a_data_set_with_its_own_track(day: Path, capsys: Capture) -> None:
     write_drive(day, "night", make_drive(seed=1, windows=60))
     assert main(["doctor", str(day), "--drive", "night", "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["recording"] == f"{day}/night.aedat4"
-    assert "GPS coverage" in {finding["name"] for finding in said["findings"]}
+    output = json.loads(capsys.readouterr().out)
+    assert output["recording"] == f"{day}/night.aedat4"
+    assert "GPS coverage" in {finding["name"] for finding in output["findings"]}
     assert main(["doctor", str(day)]) == 2
     assert "say which with --drive: day, night" in capsys.readouterr().err
 
@@ -67,14 +67,14 @@ def test_a_damaged_recording_is_examined_and_ends_with_3(day: Path, capsys: Capt
     content = (day / "many.aedat4").read_bytes()
     (day / "cut.aedat4").write_bytes(content[: len(content) // 2])
     assert main(["doctor", f"{day}/cut.aedat4"]) == 3
-    said = capsys.readouterr()
-    assert said.out.splitlines()[3].split()[:2] == ["bad", "reading"]
-    assert said.err.startswith("evplace: ")
-    assert said.err.count("\n") == 1
+    output = capsys.readouterr()
+    assert output.out.splitlines()[3].split()[:2] == ["bad", "reading"]
+    assert output.err.startswith("evplace: ")
+    assert output.err.count("\n") == 1
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "words"),
     [
         (["none.aedat4"], "none.aedat4"),
         (["day.csv"], "known are"),
@@ -85,10 +85,10 @@ def test_a_damaged_recording_is_examined_and_ends_with_3(day: Path, capsys: Capt
     ],
 )
 def test_what_cannot_be_read_ends_with_2(
-    day: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, arguments: list[str], said: str
+    day: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
 ) -> None:
     monkeypatch.chdir(day)
     assert main(["doctor", *arguments]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1
-    assert said in lines[0]
+    assert words in lines[0]

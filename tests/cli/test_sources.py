@@ -20,7 +20,7 @@ Capture = pytest.CaptureFixture[str]
 DATE = "2014-12-09-13-21-02"
 
 
-def said(capsys: Capture, *arguments: object) -> Any:
+def json_of(capsys: Capture, *arguments: object) -> Any:
     """What a command prints with --json."""
     capsys.readouterr()
     assert main([*map(str, arguments), "--json"]) == 0
@@ -57,42 +57,42 @@ def recipe_of(traverse: Path) -> Recipe:
 def test_a_drive_of_a_data_set(tmp_path: Path, capsys: Capture) -> None:
     write_robotcar(tmp_path / "oxford")
     out = tmp_path / "t"
-    facts = said(capsys, "images", tmp_path / "oxford", "--drive", DATE, "-o", out)
+    facts = json_of(capsys, "images", tmp_path / "oxford", "--drive", DATE, "-o", out)
     assert facts["shape"] == [90, 160]
     assert facts["with_position"] > 0
     assert recipe_of(out).kind == "events"
     assert recipe_of(out).windows.dt == "1/16"
     again = ("images", tmp_path / "oxford", "--overwrite", "-o", out)
-    assert said(capsys, *again, "--kind", "frames", "--width", 40)["shape"] == [90, 40, 3]
-    said(capsys, *again, "--dt", "1/30")
+    assert json_of(capsys, *again, "--kind", "frames", "--width", 40)["shape"] == [90, 40, 3]
+    json_of(capsys, *again, "--dt", "1/30")
     assert recipe_of(out).windows.dt == "1/30"
 
 
 def test_what_is_not_said_is_the_data_sets_own(tmp_path: Path, capsys: Capture) -> None:
     write_lens(tmp_path)
     out = ("images", tmp_path, "-o", tmp_path / "t", "--overwrite")
-    assert said(capsys, *out)["shape"] == [7, 7]
-    assert said(capsys, *out, "--width=14")["shape"] == [7, 14]
+    assert json_of(capsys, *out)["shape"] == [7, 7]
+    assert json_of(capsys, *out, "--width=14")["shape"] == [7, 14]
     toml = tmp_path / "s.toml"
     toml.write_text("[images]\nheight = 21\n")
-    assert said(capsys, *out, "--settings", toml)["shape"] == [21, 7]
+    assert json_of(capsys, *out, "--settings", toml)["shape"] == [21, 7]
     toml.write_text('given = "width"\n')
     assert "unknown setting 'given'" in fault(capsys, *out, "--settings", toml)
 
 
 def test_the_settings_that_are_shown_are_those_of_the_data_set(tmp_path: Path, capsys: Capture) -> None:
     write_robotcar(tmp_path)
-    shown = said(capsys, "images", tmp_path, "--drive", DATE, "--height=30", "--show-settings")
+    shown = json_of(capsys, "images", tmp_path, "--drive", DATE, "--height=30", "--show-settings")
     assert shown["windows.dt"] == {"value": "1/16", "from": "input"}
     assert shown["images.height"] == {"value": 30, "from": "flag"}
-    assert said(capsys, "images", "--show-settings")["windows.dt"] == {"value": "1/30", "from": "default"}
+    assert json_of(capsys, "images", "--show-settings")["windows.dt"] == {"value": "1/30", "from": "default"}
 
 
 def test_a_video_is_simulated_or_kept(tmp_path: Path, capsys: Capture) -> None:
     video, out = write_video(tmp_path / "film.mp4"), tmp_path / "t"
-    assert said(capsys, "images", video, "-o", out)["shape"] == [90, 160]
+    assert json_of(capsys, "images", video, "-o", out)["shape"] == [90, 160]
     assert Traverse.load(out).info["simulated"]["seed"] == 0
-    facts = said(capsys, "images", video, "-o", out, "--kind", "frames", "--overwrite")
+    facts = json_of(capsys, "images", video, "-o", out, "--kind", "frames", "--overwrite")
     assert (facts["images"], facts["shape"]) == (12, [90, 160, 3])
     assert Traverse.load(out).info["timed"]
 
@@ -100,11 +100,11 @@ def test_a_video_is_simulated_or_kept(tmp_path: Path, capsys: Capture) -> None:
 def test_a_query_is_made_as_its_map_was(tmp_path: Path, capsys: Capture) -> None:
     video = write_video(tmp_path / "film.mp4")
     for kind in ("events", "frames"):
-        said(capsys, "images", video, "-o", tmp_path / kind, "--kind", kind)
+        json_of(capsys, "images", video, "-o", tmp_path / kind, "--kind", kind)
         made = ("-o", tmp_path / f"{kind}.evp", "--scorer", "sad", "--run-length", 2)
-        said(capsys, "train", tmp_path / kind, *made)
+        json_of(capsys, "train", tmp_path / kind, *made)
         query = ("evaluate", tmp_path / f"{kind}.evp", video, "--matcher", "best")
-        assert said(capsys, *query, "-o", tmp_path / f"{kind}.result")["accuracy"] > 0.8
+        assert json_of(capsys, *query, "-o", tmp_path / f"{kind}.result")["accuracy"] > 0.8
 
 
 def test_a_folder_of_images_is_kept_or_simulated(tmp_path: Path, capsys: Capture) -> None:
@@ -112,9 +112,9 @@ def test_a_folder_of_images_is_kept_or_simulated(tmp_path: Path, capsys: Capture
     folder = tmp_path / "day" / "images"
     (tmp_path / "day" / "6dpose_list.txt").unlink()
     out = ("images", "-o", tmp_path / "t", "--fps", 60, "--overwrite")
-    assert said(capsys, *out, folder)["images"] == 6
-    assert said(capsys, *out, folder.parent)["images"] == 6
-    assert said(capsys, *out, folder, "--kind", "events")["shape"] == [90, 160]
+    assert json_of(capsys, *out, folder)["images"] == 6
+    assert json_of(capsys, *out, folder.parent)["images"] == 6
+    assert json_of(capsys, *out, folder, "--kind", "events")["shape"] == [90, 160]
 
 
 def test_fast_films_are_remarked_upon(tmp_path: Path, capsys: Capture) -> None:
@@ -128,9 +128,9 @@ def test_fast_films_are_remarked_upon(tmp_path: Path, capsys: Capture) -> None:
 def test_a_traverse_becomes_a_folder_of_images(tmp_path: Path, capsys: Capture) -> None:
     write_drive(tmp_path, "day", make_drive(windows=8))
     day, images = tmp_path / "day", tmp_path / "campus" / "database"
-    said(capsys, "images", f"{day}.aedat4", "--track", f"{day}.csv", "-o", day)
-    assert said(capsys, "convert", day, images) == {"images": 8, "without_position": 0}
-    assert said(capsys, "images", images.parent, "-o", tmp_path / "back")["with_position"] == 8
+    json_of(capsys, "images", f"{day}.aedat4", "--track", f"{day}.csv", "-o", day)
+    assert json_of(capsys, "convert", day, images) == {"images": 8, "without_position": 0}
+    assert json_of(capsys, "images", images.parent, "-o", tmp_path / "back")["with_position"] == 8
     assert np.allclose(
         np.load(day / "track.npy")[:, 2:4], np.load(tmp_path / "back" / "track.npy")[:, 2:4], atol=0.01
     )
@@ -138,10 +138,10 @@ def test_a_traverse_becomes_a_folder_of_images(tmp_path: Path, capsys: Capture) 
 
 
 def test_the_list_of_one_family(capsys: Capture) -> None:
-    parts = said(capsys, "list", "datasets")
+    parts = json_of(capsys, "list", "datasets")
     assert list(parts) == ["datasets"]
     assert "Needs DATE/stereo/centre/*.png" in parts["datasets"]["robotcar"]["about"]
-    assert set(parts) < set(said(capsys, "list"))
+    assert set(parts) < set(json_of(capsys, "list"))
     assert "colours" in fault(capsys, "list", "colours")
 
 
@@ -171,12 +171,12 @@ def test_a_picture_beside_a_data_set_changes_nothing(tmp_path: Path, capsys: Cap
     write_own(tmp_path, ("day",))
     Image.fromarray(picture(0)).save(tmp_path / "preview.png")
     (tmp_path / "notes.csv").mkdir()
-    assert said(capsys, "images", tmp_path, "-o", tmp_path / "t")["with_position"] > 0
+    assert json_of(capsys, "images", tmp_path, "-o", tmp_path / "t")["with_position"] > 0
 
 
 def test_a_folder_of_named_positions_keeps_them(tmp_path: Path, capsys: Capture) -> None:
     folder = write_utm(tmp_path, "database", [SAN_FRANCISCO])
-    assert said(capsys, "images", folder, "-o", tmp_path / "t")["with_position"] == 1
+    assert json_of(capsys, "images", folder, "-o", tmp_path / "t")["with_position"] == 1
 
 
 def test_a_film_that_breaks_off_keeps_its_good_part(tmp_path: Path, capsys: Capture) -> None:
@@ -194,7 +194,7 @@ def test_a_film_that_breaks_off_keeps_its_good_part(tmp_path: Path, capsys: Capt
         printed = capsys.readouterr()
         assert "4.png" in json.loads(printed.out)["fault"]
         assert len(printed.err.splitlines()) == 1
-    assert said(capsys, "info", tmp_path / "made.npz")["events"] > 0
+    assert json_of(capsys, "info", tmp_path / "made.npz")["events"] > 0
 
 
 def test_flags_without_a_meaning_are_refused(tmp_path: Path, capsys: Capture) -> None:

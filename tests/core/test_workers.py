@@ -43,12 +43,12 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_every_line_is_told_with_the_job_that_said_it(module: str) -> None:
-    said: list[tuple[int, str]] = []
+    lines: list[tuple[int, str]] = []
     jobs = [{"does": "say", "name": name, "lines": 3} for name in "ab"]
-    run_all(module, jobs, 2, lambda index, line: said.append((index, line)))
-    assert sorted(said) == [(n, f"{'ab'[n]} {k}") for n in (0, 1) for k in range(3)]
-    run_all(module, [], 2, lambda index, line: said.clear())
-    assert said
+    run_all(module, jobs, 2, lambda index, line: lines.append((index, line)))
+    assert sorted(lines) == [(n, f"{'ab'[n]} {k}") for n in (0, 1) for k in range(3)]
+    run_all(module, [], 2, lambda index, line: lines.clear())
+    assert lines
 
 
 def test_errors_travel_and_a_killed_worker_is_told(module: str) -> None:
@@ -63,19 +63,19 @@ def test_errors_travel_and_a_killed_worker_is_told(module: str) -> None:
 
 
 def test_the_first_error_ends_all(module: str) -> None:
-    said: list[str] = []
+    lines: list[str] = []
     jobs = [{"does": "wait", "lines": 0}, {"does": "fail"}, {"does": "wait", "lines": 0}]
     with pytest.raises(SettingsError):
-        run_all(module, jobs, 2, lambda _, line: said.append(line))
-    assert said == []
+        run_all(module, jobs, 2, lambda _, line: lines.append(line))
+    assert lines == []
 
 
 def test_a_job_may_be_long(module: str) -> None:
-    said: list[str] = []
+    lines: list[str] = []
     run_all(
-        module, [{"does": "say", "name": "n" * 300_000, "lines": 1}], 1, lambda _, line: said.append(line)
+        module, [{"does": "say", "name": "n" * 300_000, "lines": 1}], 1, lambda _, line: lines.append(line)
     )
-    assert len(said[0]) == 300_002
+    assert len(lines[0]) == 300_002
 
 
 def test_files_of_the_current_folder_are_not_taken_for_modules(
@@ -85,9 +85,9 @@ def test_files_of_the_current_folder_are_not_taken_for_modules(
     for name in ("json", "random", "numpy"):
         (tmp_path / "here" / f"{name}.py").write_text("raise SystemExit('not this one')")
     monkeypatch.chdir(tmp_path / "here")
-    said: list[str] = []
-    run_all(module, [{"does": "say", "name": "é", "lines": 1}], 1, lambda _, line: said.append(line))
-    assert said == ["é 0"]
+    lines: list[str] = []
+    run_all(module, [{"does": "say", "name": "é", "lines": 1}], 1, lambda _, line: lines.append(line))
+    assert lines == ["é 0"]
 
 
 def test_an_error_keeps_its_kind_and_its_words() -> None:

@@ -55,10 +55,10 @@ def test_the_worst_comes_first_and_json_is_finite(tmp_path: Path) -> None:
     order = [STATES.index(finding.state) for finding in found.findings]
     assert order == sorted(order)
     assert found.findings[0].name == "GPS coverage"
-    said = as_json(found)
-    assert json.loads(json.dumps(said, allow_nan=False)) == said
-    assert len({finding["name"] for finding in said["findings"]}) == len(said["findings"])
-    for finding in said["findings"]:
+    written = as_json(found)
+    assert json.loads(json.dumps(written, allow_nan=False)) == written
+    assert len({finding["name"] for finding in written["findings"]}) == len(written["findings"])
+    for finding in written["findings"]:
         assert finding["sentence"].endswith(".")
         assert (finding["state"] in ("good", "unknown")) == (not finding["advice"])
 

@@ -54,7 +54,7 @@ def case(
     return true_s, Fit.of(t_us, mean_around(activity, 5)[here], road(fixes_s - true_s, metres))
 
 
-def told(fit: Fit | str) -> Offset | None:
+def offset_of(fit: Fit | str) -> Offset | None:
     found = fit if isinstance(fit, str) else fit.offset()
     return None if isinstance(found, str) else found
 
@@ -62,7 +62,7 @@ def told(fit: Fit | str) -> Offset | None:
 def test_the_stated_uncertainty_covers_the_truth() -> None:
     """95 % is stated; of 20 drives, chance leaves fewer than 17 covered in two cases of a hundred."""
     cases = [case(seed) for seed in range(20)]
-    offsets = [(true_s, told(fit)) for true_s, fit in cases]
+    offsets = [(true_s, offset_of(fit)) for true_s, fit in cases]
     sure = [(true_s, found) for true_s, found in offsets if found is not None]
     assert len(sure) >= 16
     covered = [abs(found.seconds - true_s) <= found.uncertainty_s for true_s, found in sure]
@@ -72,11 +72,11 @@ def test_the_stated_uncertainty_covers_the_truth() -> None:
 
 
 def test_of_unrelated_drives_hardly_any_offset_is_told() -> None:
-    assert sum(told(case(seed, 150, related=False)[1]) is not None for seed in range(12)) <= 1
+    assert sum(offset_of(case(seed, 150, related=False)[1]) is not None for seed in range(12)) <= 1
 
 
 def test_a_longer_recording_is_surer() -> None:
-    halves = [told(case(3, seconds, added_s=1.0)[1]) for seconds in (300, 1200)]
+    halves = [offset_of(case(3, seconds, added_s=1.0)[1]) for seconds in (300, 1200)]
     assert halves[0] is not None
     assert halves[1] is not None
     assert halves[1].uncertainty_s < halves[0].uncertainty_s

@@ -61,20 +61,20 @@ def unpacked(values: Mapping[str, str]) -> EvplaceError:
     return kind.__new__(kind, values["text"])  # past an __init__ that would build the text again
 
 
-def run_all(module: str, jobs: Sequence[Job], count: int, tell: Callable[[int, str], None]) -> None:
+def run_all(module: str, jobs: Sequence[Job], count: int, report: Callable[[int, str], None]) -> None:
     """Do all `jobs` in processes of `module`, which calls `serve`, `count` at a time, in their order.
 
-    `tell` gets the job's index and each line that it prints, one call at a time. The first error ends all:
+    `report` gets the job's index and each line that it prints, one call at a time. The first error ends all:
     the worker's own, or OutputError for one that was stopped.
     """
     running, alone = _Running(), Lock()
 
     def work(index: int) -> None:
-        def tell_alone(line: str) -> None:
+        def report_alone(line: str) -> None:
             with alone:
-                tell(index, line)
+                report(index, line)
 
-        _run(module, jobs[index], running, tell_alone)
+        _run(module, jobs[index], running, report_alone)
 
     with ThreadPoolExecutor(max(1, count)) as pool:
         parts = [pool.submit(work, index) for index in range(len(jobs))]
@@ -133,7 +133,7 @@ class _Running:
                 process.kill()
 
 
-def _run(module: str, job: Job, running: _Running, tell: Callable[[str], None]) -> None:
+def _run(module: str, job: Job, running: _Running, report: Callable[[str], None]) -> None:
     with start(module, job) as process:
         running.add(process)
         assert process.stdout is not None
@@ -141,7 +141,7 @@ def _run(module: str, job: Job, running: _Running, tell: Callable[[str], None]) 
             line = data.decode()
             if line.startswith(_ERROR):
                 raise unpacked(json.loads(line.removeprefix(_ERROR)))
-            tell(line.strip())
+            report(line.strip())
         code = process.wait()
     if code < 0:
         raise OutputError(f"a worker was stopped by signal {-code}: run again to go on")

@@ -13,7 +13,7 @@ from evplace.core.storage import check_new_folder, new_folder, write_json
 from evplace.doctor._outcome import Curve, Examination, Map
 
 FINDINGS = "findings.json"
-"""What tells a folder that was written here from any other: only such a one is replaced."""
+"""What marks a folder that was written here: only such a one is replaced."""
 INK, SHADE, MARK = "#1b6ca8", "#efb998", "#c4622d"
 
 

@@ -20,7 +20,7 @@ Times = NDArray[np.int64]
 
 
 class Silences:
-    """Remembers silences; which of them are gaps is told at the end, by the rates around them."""
+    """Remembers silences; which of them are gaps is decided at the end, by the rates around them."""
 
     def __init__(self) -> None:
         self._starts: list[int] = []

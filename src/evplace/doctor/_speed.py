@@ -49,8 +49,8 @@ def turning_at(track: Track, t_us: Floats) -> Floats:
     before, here, after = (_position(track, t_us + shift) for shift in (-BASE_US, 0, BASE_US))
     a, b = here - before, after - here
     angle = np.abs(np.arctan2(a[0] * b[1] - a[1] * b[0], a[0] * b[0] + a[1] * b[1])) / (BASE_US / 1e6)
-    told = np.minimum(np.hypot(*a), np.hypot(*b)) >= SHORTEST_M  # False where NaN
-    return np.where(told, angle, 0.0)
+    known = np.minimum(np.hypot(*a), np.hypot(*b)) >= SHORTEST_M  # False where NaN
+    return np.where(known, angle, 0.0)
 
 
 def _position(track: Track, t_us: Floats) -> Floats:

@@ -29,7 +29,7 @@ Kind = Literal["events", "frames"]
 
 
 class Rates:
-    """Events in each tenth of a second; one in which none came takes no room."""
+    """Events in each tenth of a second; one in which none came takes no memory."""
 
     def __init__(self) -> None:
         self._start_us = 0

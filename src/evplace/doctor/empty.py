@@ -41,13 +41,13 @@ class Check:
             return Outcome()
         share = 100 * (total - self._filled) / total
         mean = self._subject.parts / max(self._filled, 1)
-        told = (
+        sentence = (
             f"{total - self._filled:,} of {total:,} windows of {self._subject.windows.dt} s hold no event; "
             f"the others hold {mean:,.0f} on average."
         )
         state: State = "good" if share < 1 else "look" if share < 10 else "bad"
         advice = "" if state == "good" else "choose a longer `dt`; `every_events` leaves empty ones out"
-        return Outcome([Finding("empty windows", state, share, "%", told, advice)])
+        return Outcome([Finding("empty windows", state, share, "%", sentence, advice)])
 
     def _number(self, t_us: int) -> int:
         """The window of a time, from 1 (Eq. 4: open on the left; the first event is put into window 1)."""

@@ -44,8 +44,10 @@ class Check:
         """Findings: frames, frame times, repeated frames, image motion; the motion as a curve."""
         pixels = np.array(self._pixels)
         if not len(pixels):
-            told = "Fewer than two frames of one size: no events can come of them."
-            return Outcome([Finding("frames", "bad", len(self._t_us), "frames", told, "give the whole film")])
+            sentence = "Fewer than two frames of one size: no events can come of them."
+            return Outcome(
+                [Finding("frames", "bad", len(self._t_us), "frames", sentence, "give the whole film")]
+            )
         times = np.array(self._t_us, np.int64)
         steps = times[1:] - times[:-1]
         fps = 1e6 / float(np.median(steps))
@@ -66,42 +68,42 @@ class Check:
 def _sizes(odd: int, frames: int) -> Finding:
     if not odd:
         return Finding("frames", "good", frames, "frames", "All frames are of one size.")
-    told = f"The size of the frames changes {counted(odd, 'time', 'times')}: no sensor does that."
-    return Finding("frames", "bad", frames, "frames", told, "bring all frames to one size")
+    sentence = f"The size of the frames changes {counted(odd, 'time', 'times')}: no sensor does that."
+    return Finding("frames", "bad", frames, "frames", sentence, "bring all frames to one size")
 
 
 def _times(steps: NDArray[np.int64], fps: float, timed: bool) -> Finding:
     late = int(np.sum(steps > 1.5 * np.median(steps)))
-    told = f"{len(steps) + 1:,} frames, {fps:.1f} a second; {counted(late, 'comes', 'come')} late."
+    sentence = f"{len(steps) + 1:,} frames, {fps:.1f} a second; {counted(late, 'comes', 'come')} late."
     if not timed:
         return Finding(
-            "frame times", "look", fps, "frames/s", f"{told} It has no times: the rate is that of `fps`.",
+            "frame times", "look", fps, "frames/s", f"{sentence} It has no times: the rate is that of `fps`.",
             "put timestamps.txt (seconds, one a line) beside the images",
         )  # fmt: skip
     if not SLOWEST_FPS <= fps <= FASTEST_FPS:
-        told = f"{len(steps) + 1:,} frames, {fps:.3g} a second: no camera does that."
-        return Finding("frame times", "bad", fps, "frames/s", told, "are the times in seconds?")
+        sentence = f"{len(steps) + 1:,} frames, {fps:.3g} a second: no camera does that."
+        return Finding("frame times", "bad", fps, "frames/s", sentence, "are the times in seconds?")
     state: State = "good" if not late else "look" if late < 0.01 * len(steps) else "bad"
     advice = "" if state == "good" else "frames are missing: the motion across a hole is guessed"
-    return Finding("frame times", state, fps, "frames/s", told, advice)
+    return Finding("frame times", state, fps, "frames/s", sentence, advice)
 
 
 def _repeated(same: int, pairs: int) -> Finding:
     share = 100 * same / pairs
-    told = f"{same:,} of {pairs + 1:,} frames equal the one before them."
+    sentence = f"{same:,} of {pairs + 1:,} frames equal the one before them."
     if share < 1:
-        return Finding("repeated frames", "good", share, "%", told)
+        return Finding("repeated frames", "good", share, "%", sentence)
     advice = "take the film at its own rate: repeated frames make bursts of events"
-    return Finding("repeated frames", "look" if share < 20 else "bad", share, "%", told, advice)
+    return Finding("repeated frames", "look" if share < 20 else "bad", share, "%", sentence, advice)
 
 
 def _motion(pixels: NDArray[np.float64], fps: float) -> Finding:
     usual, most = float(np.median(pixels)), float(np.percentile(pixels, 95))
     fast = 100 * float(np.mean(pixels > TOO_FAST))
-    told = (
+    sentence = (
         f"The image moves by {usual:.2f} pixels from one frame to the next, 95 % by less than {most:.2f}; "
         f"{fast:.1f} % of the steps are over {TOO_FAST:g} pixel, where events are guessed."
     )
     state: State = "good" if fast < 1 else "look" if fast < 10 else "bad"
     advice = f"give about {fps * most / TOO_FAST:.0f} frames a second or more (record so, or interpolate)"
-    return Finding("image motion", state, most, "pixels", told, "" if state == "good" else advice)
+    return Finding("image motion", state, most, "pixels", sentence, "" if state == "good" else advice)

@@ -19,7 +19,7 @@ CHANCE = 16.0
 
 
 class Check:
-    """Passes the events on to the meter of the cleaning room."""
+    """Passes the events on to the meter that cleaning uses."""
 
     def __init__(self, subject: Subject) -> None:
         self._subject = subject
@@ -34,8 +34,8 @@ class Check:
         strengths = self._meter.strengths()
         known = np.isfinite(strengths[:, :, 0])
         if not known.any():
-            told = "Cannot be told: no region has enough events in whole quarters of a second."
-            return Outcome([Finding("flicker", "unknown", None, "%", told)])
+            sentence = "Cannot be determined: no region has enough events in whole quarters of a second."
+            return Outcome([Finding("flicker", "unknown", None, "%", sentence)])
         best = np.where(known, np.max(strengths, axis=2, initial=0, where=known[:, :, None]), 0)
         pairs = np.maximum(self._meter.pairs(), 1)
         flickers = best > np.maximum(STRONG, CHANCE / np.sqrt(pairs))
@@ -58,13 +58,13 @@ def _finding(beats: NDArray[np.int64], events: NDArray[np.float64]) -> Finding:
     if not (beats >= 0).any():
         return Finding("flicker", "good", 0.0, "%", "No region beats with lamps on the mains.")
     weights = [float(events[beats == at].sum()) for at in range(len(MAINS_HZ))]
-    told = ", ".join(
+    beating = ", ".join(
         f"{MAINS_HZ[at]} Hz in {int((beats == at).sum())}" for at in np.argsort(weights)[::-1] if weights[at]
     )
     state: State = "good" if share < 1 else "look" if share < 20 else "bad"
     return Finding(
         "flicker", state, share, "%",
-        f"Lamps beat at {told} of {beats.size:,} regions, which give {share:.1f} % of the events.",
+        f"Lamps beat at {beating} of {beats.size:,} regions, which give {share:.1f} % of the events.",
         "" if state == "good" else f"`flicker_hz={MAINS_HZ[int(np.argmax(weights))]}`",
     )  # fmt: skip
 

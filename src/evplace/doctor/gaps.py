@@ -25,12 +25,12 @@ class Check(AtTheEnd):
         if lengths[longest] * 1e6 > LEAP_US:
             return Outcome([_leap(float(self._subject.seconds(starts)[longest]), float(lengths[longest]))])
         state: State = "bad" if total > MUCH * self._subject.span_s else "look"
-        told = (
+        sentence = (
             f"The whole sensor is silent {counted(len(starts), 'time', 'times')}, {total:.3f} s in all; the "
             f"longest is {lengths[longest]:.3f} s at {float(self._subject.seconds(starts)[longest]):.3f} s."
         )
         advice = "events are missing: check cable, hub and disk, or lower the event rate by the biases"
-        return Outcome([Finding("gaps", state, total, "s", told, advice)])
+        return Outcome([Finding("gaps", state, total, "s", sentence, advice)])
 
 
 def _leap(at_s: float, length_s: float) -> Finding:

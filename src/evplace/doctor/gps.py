@@ -36,18 +36,18 @@ def _quality(track: Track) -> Finding:
     lost = sum(track.dropped.values())
     share = 100 * lost / (lost + len(track))
     seconds = (track.t_us[-1] - track.t_us[0]) / 1e6
-    told = f"{counted(len(track), 'fix', 'fixes')} in {seconds:.1f} s"
+    sentence = f"{counted(len(track), 'fix', 'fixes')} in {seconds:.1f} s"
     if len(track) < 2:
         advice = "give the log of the whole drive"
-        return Finding("GPS fixes", "bad", share, "% unusable", f"{told}: that makes no track.", advice)
+        return Finding("GPS fixes", "bad", share, "% unusable", f"{sentence}: that makes no track.", advice)
     if not lost:
-        return Finding("GPS fixes", "good", 0.0, "% unusable", f"{told}; all can be used.")
+        return Finding("GPS fixes", "good", 0.0, "% unusable", f"{sentence}; all can be used.")
     reasons = ", ".join(f"{number:,} {reason}" for reason, number in track.dropped.items())
     state: State = "good" if share < 1 else "look" if share < 20 else "bad"
     advice = (
         "" if state == "good" else "keep the receiver in the open and wait for its fix before driving off"
     )
-    return Finding("GPS fixes", state, share, "% unusable", f"{told}; left out: {reasons}.", advice)
+    return Finding("GPS fixes", state, share, "% unusable", f"{sentence}; left out: {reasons}.", advice)
 
 
 def _gaps(track: Track) -> Finding:
@@ -96,17 +96,19 @@ def _repeated(track: Track) -> Finding:
     same = (np.diff(track.easting) == 0) & (np.diff(track.northing) == 0)
     moves = mean_around(~same, AROUND) * (2 * AROUND + 1) >= 2
     share = 100 * float(np.mean(same & moves))
-    told = f"{share:.1f} % of the fixes repeat the position before them while the track moves."
+    sentence = f"{share:.1f} % of the fixes repeat the position before them while the track moves."
     if share < 20:
-        return Finding("GPS repeats", "good", share, "%", told)
-    return Finding("GPS repeats", "look", share, "%", told, "keep only the fixes that are new")
+        return Finding("GPS repeats", "good", share, "%", sentence)
+    return Finding("GPS repeats", "look", share, "%", sentence, "keep only the fixes that are new")
 
 
 def _covered(subject: Subject, track: Track) -> Finding:
     """Asked every tenth of a second, as long as the recording runs."""
     t_us, _ = subject.smooth_activity()
     if not len(t_us):
-        return Finding("GPS coverage", "unknown", None, "%", "Cannot be told: the recording holds nothing.")
+        return Finding(
+            "GPS coverage", "unknown", None, "%", "Cannot be determined: the recording holds nothing."
+        )
     share = 100 * float(track.at(t_us).known.mean())
     if track.t_us[-1] < subject.t_first_us or track.t_us[0] > subject.t_last_us:
         return Finding(
@@ -117,6 +119,6 @@ def _covered(subject: Subject, track: Track) -> Finding:
             "give the recording's own track, or shift its times with `offset_us`",
         )  # fmt: skip
     state: State = "good" if share >= 95 else "look" if share >= 50 else "bad"
-    told = f"{share:.1f} % of the recording has a position."
+    sentence = f"{share:.1f} % of the recording has a position."
     advice = "" if state == "good" else "images without a position are left out of the truth: see GPS gaps"
-    return Finding("GPS coverage", state, share, "%", told, advice)
+    return Finding("GPS coverage", state, share, "%", sentence, advice)

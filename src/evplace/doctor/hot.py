@@ -20,7 +20,7 @@ class Check(AtTheEnd):
         hot = hot_pixels(counts)
         number, share = int(hot.sum()), 100 * float(counts[hot].sum()) / max(float(counts.sum()), 1.0)
         state: State = "good" if share < 1 else "look" if share < 10 else "bad"
-        told = f"{number:,} of {hot.size:,} pixels fire by themselves, with {share:.2f} % of the events."
+        sentence = f"{number:,} of {hot.size:,} pixels fire by themselves, with {share:.2f} % of the events."
         advice = "" if state == "good" else "`mask_hot=True`"
         rows, columns = np.nonzero(hot)
         drawing = Map(
@@ -30,4 +30,4 @@ class Check(AtTheEnd):
             np.log10(1.0 + counts),
             np.column_stack([columns, rows]).astype(np.float64),
         )
-        return Outcome([Finding("hot pixels", state, share, "%", told, advice)], [drawing])
+        return Outcome([Finding("hot pixels", state, share, "%", sentence, advice)], [drawing])

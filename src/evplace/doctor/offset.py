@@ -28,7 +28,7 @@ REACH_S = 30.0
 BLOCK_S = 10.0
 """Length of a block of the bootstrap."""
 FEWEST = 6
-"""Blocks without which nothing can be told: a minute."""
+"""Fewest blocks that an offset is measured from: a minute."""
 DRAWS = 200
 """Draws of the bootstrap."""
 STEADY_MPS = 1.0
@@ -43,7 +43,7 @@ MODEL_S = 0.3
 """What the model itself may be wrong by, as the camera sees ahead of the car: drives of the virtual city,
 whose clocks agree, give 0.2 s. It is added to the bootstrap's uncertainty, by squares."""
 VAGUE_S = 3.0
-"""Uncertainty above which the offset is not told: it would not say which place is which."""
+"""Uncertainty above which no offset is given: it would not say which place is which."""
 HARMLESS_S = 0.5
 """An offset below this, or below its uncertainty, costs a few metres at most."""
 
@@ -95,7 +95,7 @@ class Fit:
 
     @classmethod
     def of(cls, t_us: NDArray[np.int64], activity: Floats, track: Track) -> Fit | str:
-        """For an activity (n,) every tenth of a second; where nothing can be told, the reason why."""
+        """For an activity (n,) every tenth of a second; where no offset can be measured, the reason why."""
         per_block = int(BLOCK_S * 1e6) // BIN_US
         blocks = len(t_us) // per_block
         if blocks < FEWEST:
@@ -146,7 +146,7 @@ class Fit:
         return np.ones((1, len(self.sums)))
 
     def offset(self) -> Offset | str:
-        """The offset with its uncertainty; where it cannot be told, the reason why."""
+        """The offset with its uncertainty; where it cannot be given, the reason why."""
         fit = float(self.correlation(self.every).max())
         if fit < LEAST_FIT:
             return f"events and speed have too little in common (correlation {fit:.2f})"
@@ -181,20 +181,20 @@ def _sums(x: Floats, y: Floats, blocks: int) -> Floats:
 
 
 def _untold(reason: str) -> Finding:
-    return Finding("clock offset", "unknown", None, "s", f"Cannot be told: {reason}.")
+    return Finding("clock offset", "unknown", None, "s", f"Cannot be determined: {reason}.")
 
 
 def _finding(offset: Offset) -> Finding:
-    told = (
+    sentence = (
         f"The track fits best with {offset.seconds:+.2f} s added to its times, give or take "
         f"{offset.uncertainty_s:.2f} s (95 %; correlation {offset.fit:.2f})."
     )
     away = abs(offset.seconds)
     if away <= max(HARMLESS_S, offset.uncertainty_s):
-        return Finding("clock offset", "good", offset.seconds, "s", told)
+        return Finding("clock offset", "good", offset.seconds, "s", sentence)
     state: State = "look" if away - offset.uncertainty_s < 2 else "bad"
     advice = (
         f"shift the track's times by {offset.seconds:.2f} s with `offset_us` (on top of a shift that was "
         "given), or set both clocks by GPS time"
     )
-    return Finding("clock offset", state, offset.seconds, "s", told, advice)
+    return Finding("clock offset", state, offset.seconds, "s", sentence, advice)

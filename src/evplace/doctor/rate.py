@@ -44,26 +44,26 @@ class Check:
     def _rate(self, least: float, most: float) -> Finding:
         subject = self._subject
         if subject.span_s == 0:
-            told = "All events have one time: nothing that needs a time can be told."
-            return Finding("event rate", "bad", None, "events/s", told, "give the right `time_unit`")
+            sentence = "All events have one time: nothing that needs a time can be measured."
+            return Finding("event rate", "bad", None, "events/s", sentence, "give the right `time_unit`")
         rate = subject.parts / subject.span_s
-        told = f"{rate / 1e6:.3f} million events/s"
+        sentence = f"{rate / 1e6:.3f} million events/s"
         if subject.span_s * 1e6 >= 2 * BIN_US:
-            told += f"; in single tenths of a second from {least / 1e6:.3f} to {most / 1e6:.3f}"
+            sentence += f"; in single tenths of a second from {least / 1e6:.3f} to {most / 1e6:.3f}"
         if rate < FEW_HZ * subject.counts.size:
             return Finding(
                 "event rate", "look", rate, "events/s",
-                f"{told}: little for {subject.counts.size:,} pixels.",
+                f"{sentence}: little for {subject.counts.size:,} pixels.",
                 "lower the camera's thresholds; check the unit of time and the lens",
             )  # fmt: skip
-        return Finding("event rate", "good", rate, "events/s", f"{told}.")
+        return Finding("event rate", "good", rate, "events/s", f"{sentence}.")
 
     def _signs(self) -> Finding:
         share = self._brighter / self._subject.parts
-        told = f"{100 * share:.0f} % of the events are brighter, {100 * (1 - share):.0f} % darker."
+        sentence = f"{100 * share:.0f} % of the events are brighter, {100 * (1 - share):.0f} % darker."
         if LOPSIDED <= share <= 1 - LOPSIDED:
-            return Finding("signs", "good", 100 * share, "%", told)
+            return Finding("signs", "good", 100 * share, "%", sentence)
         return Finding(
-            "signs", "look", 100 * share, "%", f"{told} One sign is all but missing.",
+            "signs", "look", 100 * share, "%", f"{sentence} One sign is all but missing.",
             "binary images do not mind; else balance the camera's two thresholds, or check the file's signs",
         )  # fmt: skip

@@ -86,7 +86,7 @@ def _clock(wraps: int, back_us: int, backwards: int, total: int) -> Finding:
             f"add {1 << turn} us to all times after each turn, in the program that wrote the file",
         )  # fmt: skip
     if wraps:
-        told = f"The file's clock started anew {wraps} times; the reader counted on."
+        sentence = f"The file's clock started anew {wraps} times; the reader counted on."
     else:
-        told = "The file's clock did not start anew."
-    return Finding("clock", "good", wraps, "wraps", told)
+        sentence = "The file's clock did not start anew."
+    return Finding("clock", "good", wraps, "wraps", sentence)

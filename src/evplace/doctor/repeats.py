@@ -56,10 +56,10 @@ def _twice(number: int, total: int) -> Finding:
 
 def _soon(number: int, total: int) -> Finding:
     share = number / total
-    told = f"{100 * share:.1f} % of the events follow one of their pixel within {SOON_US / 1000:g} ms."
+    sentence = f"{100 * share:.1f} % of the events follow one of their pixel within {SOON_US / 1000:g} ms."
     if share < MANY:
-        return Finding("quick repeats", "good", 100 * share, "%", told)
-    return Finding("quick repeats", "look", 100 * share, "%", told, f"`refractory_us={SOON_US}`")
+        return Finding("quick repeats", "good", 100 * share, "%", sentence)
+    return Finding("quick repeats", "look", 100 * share, "%", sentence, f"`refractory_us={SOON_US}`")
 
 
 @njit(cache=True)

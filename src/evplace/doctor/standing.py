@@ -34,8 +34,8 @@ class Check(AtTheEnd):
         """Findings: quiet stretches, and stand-still where a track covers the recording."""
         t_us, activity = self._subject.smooth_activity()
         if np.isfinite(activity).sum() * BIN_US < 2 * SHORTEST_S * 1e6:
-            told = f"Cannot be told: the recording has less than {2 * SHORTEST_S:g} s without gaps."
-            return Outcome([Finding("quiet stretches", "unknown", None, "%", told)])
+            sentence = f"Cannot be determined: the recording has less than {2 * SHORTEST_S:g} s without gaps."
+            return Outcome([Finding("quiet stretches", "unknown", None, "%", sentence)])
         quiet = _long(activity <= LOW * np.nanpercentile(activity, 90))
         findings = [_finding("quiet stretches", quiet, self._subject, t_us, "the image hardly changes")]
         drawings = [
@@ -94,7 +94,7 @@ def _finding(name: str, found: Stretches, subject: Subject, t_us: NDArray[np.int
     if not found:
         return Finding(name, "good", 0.0, "%", f"There is no stretch of {SHORTEST_S:g} s in which {what}.")
     longest = max(found, key=lambda stretch: stretch[1] - stretch[0])
-    told = (
+    sentence = (
         f"{what.capitalize()} in {counted(len(found), 'stretch', 'stretches')}, {seconds:.1f} s in all; "
         f"the longest is {(longest[1] - longest[0]) * BIN_US / 1e6:.1f} s "
         f"from {float(subject.seconds(t_us)[longest[0]]):.1f} s on."
@@ -105,4 +105,4 @@ def _finding(name: str, found: Stretches, subject: Subject, t_us: NDArray[np.int
         if subject.track is not None
         else "`every_events` makes few images"
     )
-    return Finding(name, state, share, "%", told, "" if state == "good" else f"{thin} where it stands")
+    return Finding(name, state, share, "%", sentence, "" if state == "good" else f"{thin} where it stands")

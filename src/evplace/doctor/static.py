@@ -11,7 +11,7 @@ from evplace.sources.cleaning import static_pixels
 OF = ("events",)
 
 ENOUGH = 5
-"""Events of the median pixel below which a quiet region cannot be told from chance."""
+"""Events of the median pixel below which a quiet region cannot be sentence apart from chance."""
 MUCH = 5.0
 """Per cent of the sensor above which masking is worth a look."""
 
@@ -26,16 +26,18 @@ class Check(AtTheEnd):
         """Finding: static regions, by their share of the sensor."""
         counts = self._subject.counts
         if np.median(counts) < ENOUGH:
-            told = f"Cannot be told: half of the pixels have fewer than {ENOUGH} events; record longer."
-            return Outcome([Finding("static regions", "unknown", None, "%", told)])
+            sentence = (
+                f"Cannot be determined: half of the pixels have fewer than {ENOUGH} events; record longer."
+            )
+            return Outcome([Finding("static regions", "unknown", None, "%", sentence)])
         static = static_pixels(counts)
         share = 100 * float(static.mean())
         drawing = Map("static_regions", "Static regions", "1: static", static.astype(np.float64), top=1)
-        told = f"{share:.1f} % of the sensor hardly ever see a change{_where(static)}."
+        sentence = f"{share:.1f} % of the sensor hardly ever see a change{_where(static)}."
         if share < MUCH:
-            return Outcome([Finding("static regions", "good", share, "%", told)], [drawing])
+            return Outcome([Finding("static regions", "good", share, "%", sentence)], [drawing])
         advice = "`static_mask=True`; a bonnet at the bottom can also be cut with `crop_bottom`"
-        return Outcome([Finding("static regions", "look", share, "%", told, advice)], [drawing])
+        return Outcome([Finding("static regions", "look", share, "%", sentence, advice)], [drawing])
 
 
 def _where(static: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> str:

@@ -43,8 +43,8 @@ def as_shown(image: NDArray[np.uint8], events: bool) -> NDArray[np.uint8]:
     """An image (h, w) or (h, w, C) as (h, w, 3); an event image as ink on paper, a camera's as it is."""
     if image.ndim == 3 and image.shape[2] == 3:
         return image
-    grey = image if image.ndim == 2 else image.max(axis=2)
-    return np.repeat((255 - grey if events else grey)[..., None], 3, axis=2)
+    strongest = image if image.ndim == 2 else image.max(axis=2)  # of kinds of events, which are no colours
+    return np.repeat((255 - strongest if events else strongest)[..., None], 3, axis=2)
 
 
 def _tile(image: NDArray[np.uint8], events: bool) -> NDArray[np.uint8]:

@@ -48,7 +48,7 @@ class Film:
     def __iter__(self) -> Iterator[tuple[int, Grey]]:
         """Each image in grey: microseconds, uint8 (H, W); errors as `images`."""
         if self.frames is None:
-            return _video(self.path, "gray")
+            return _video(self.path, "gray")  # the luma that a video holds beside its colours
         return ((t_us, image if image.ndim == 2 else to_grey(image)) for t_us, image in self.images())
 
     def images(self) -> Iterator[tuple[int, NDArray[np.uint8]]]:

@@ -80,9 +80,9 @@ def _claim(folder: Path, settings: CitySettings) -> None:
         found = read_json(file, "the settings of a city")
         other = [key for key in sorted(wanted | found) if wanted.get(key) != found.get(key)]
         if other:
-            told = ", ".join(f"{key} {found.get(key)} (now {wanted.get(key)})" for key in other)
+            differences = ", ".join(f"{key} {found.get(key)} (now {wanted.get(key)})" for key in other)
             raise OutputError(
-                f"{folder} holds drives made with other settings: {told}; choose another folder"
+                f"{folder} holds drives made with other settings: {differences}; choose another folder"
             )
         return
     if folder.exists() and any(folder.iterdir()):
@@ -103,9 +103,9 @@ class _Meter:
         self._report, self._lock, self._began = report, Lock(), time.monotonic()
 
     def of(self, name: str) -> Callable[[float], None]:
-        """What one drive tells its share to."""
+        """What one drive reports its share to."""
 
-        def tell(share: float) -> None:
+        def update(share: float) -> None:
             with self._lock:
                 self._shares[name] = share
                 total = sum(self._shares.values()) / len(self._shares)
@@ -113,7 +113,7 @@ class _Meter:
                 if self._report is not None and total > 0:
                     self._report(Progress(name, total, elapsed * (1 - total) / total))
 
-        return tell
+        return update
 
 
 def _in_processes(
@@ -123,5 +123,5 @@ def _in_processes(
     warm(settings)
     plain = to_dict(settings)
     jobs = [{"out": str(folder), "settings": plain, "condition": name, "path": path} for name, path in todo]
-    tellers = [meter.of(drive_name(*pair)) for pair in todo]
-    run_all("evplace_lab.city.worker", jobs, count, lambda index, line: tellers[index](float(line)))
+    updates = [meter.of(drive_name(*pair)) for pair in todo]
+    run_all("evplace_lab.city.worker", jobs, count, lambda index, line: updates[index](float(line)))

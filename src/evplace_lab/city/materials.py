@@ -9,7 +9,7 @@ from evplace_lab.city.light import Light
 from evplace_lab.city.texture import Colour, band, hash01, mix, noise, plus, pulse, scale
 
 ROAD, PAVEMENT, FACADE, PLAIN, CAR_SIDE, LAMP, LEAVES, SIGN, FENCE, ROOF, GLASS = range(11)
-"""Materials; what the numbers of a look mean is said at each function."""
+"""Materials; each function says what the numbers of a look mean."""
 
 Look = tuple[float, ...]
 """The 16 numbers of a primitive's look: by value, since a call with an array counts its references."""

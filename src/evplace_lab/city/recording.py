@@ -30,12 +30,12 @@ COLOUR = "colour"
 """Folder of the colour traverse, beside one for each sensor."""
 
 MARK = "poses.npy"
-"""What tells a folder that was written here from any other: only such a one is replaced."""
+"""What marks a folder that was written here: only such a one is replaced."""
 PACKET = 1 << 17
 """Events that are written at a time."""
 
 Tick = Callable[[float], None]
-"""Is told the share of a drive that is done."""
+"""Called with the share of a drive that is done."""
 
 
 def record_drive(out: Path, town: Town, settings: CitySettings, name: str, path: int, tick: Tick) -> None:

@@ -14,14 +14,14 @@ from evplace_lab.city.recording import record_drive
 from evplace_lab.city.town import build_town
 
 
-def work(job: dict[str, Any], say: Callable[[str], None]) -> None:
-    """Make the drive that `job` names; says the share that is done."""
+def work(job: dict[str, Any], report: Callable[[str], None]) -> None:
+    """Make the drive that `job` names; reports the share that is done."""
     settings = make(CitySettings, job["settings"])
     town = build_town(settings.seed)
     record_drive(
-        Path(job["out"]), town, settings, job["condition"], job["path"], lambda share: say(f"{share:.4f}")
+        Path(job["out"]), town, settings, job["condition"], job["path"], lambda share: report(f"{share:.4f}")
     )
-    say("1.0")
+    report("1.0")
 
 
 if __name__ == "__main__":

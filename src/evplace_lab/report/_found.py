@@ -91,11 +91,11 @@ class PaperCurve:
 
 @dataclass(frozen=True)
 class Sheet:
-    """One JSON file: its rows, and all else that it says."""
+    """One JSON file: its rows, and all else that stands in it."""
 
     rows: tuple[Any, ...]
     others: tuple[Any, ...] = ()
-    said: Mapping[str, Any] = field(default_factory=dict)
+    rest: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -162,10 +162,10 @@ def _sheet(path: Path, wanted: str, **lists: type[Any]) -> Sheet | None:
     """A JSON file's lists of records; None where there is no file."""
     if not path.exists():
         return None
-    said = read_json(path, path.name)
-    _check_format(path, said.get("format"), wanted)
-    taken = [_records(path, said.get(name, []), name, kind) for name, kind in lists.items()]
-    rest = {key: value for key, value in said.items() if key not in lists and key != "format"}
+    content = read_json(path, path.name)
+    _check_format(path, content.get("format"), wanted)
+    taken = [_records(path, content.get(name, []), name, kind) for name, kind in lists.items()]
+    rest = {key: value for key, value in content.items() if key not in lists and key != "format"}
     return Sheet(taken[0], taken[1] if len(taken) > 1 else (), rest)
 
 

@@ -60,7 +60,7 @@ def _sections(found: Found, drawn: list[Panel]) -> Html:
 
 
 def _accuracies(name: str, sheet: Sheet, otherwise: str) -> Html:
-    title = str(sheet.said.get("title") or otherwise)
+    title = str(sheet.rest.get("title") or otherwise)
     return _section(name, title, _tables.accuracies(sheet.rows))
 
 
@@ -81,9 +81,9 @@ def _making(found: Found) -> list[Html]:
 
 
 def _details(name: str, sheet: Sheet) -> Html:
-    took = sheet.said.get("took_s")
+    took = sheet.rest.get("took_s")
     words = f"{name}: settings and versions" + (f", {took:,.0f} s" if isinstance(took, int | float) else "")
-    return tag("details", tag("summary", words), _tables.facts(sheet.said))
+    return tag("details", tag("summary", words), _tables.facts(sheet.rest))
 
 
 def _data(found: Found, drawn: list[Panel]) -> dict[str, Any]:

@@ -92,10 +92,10 @@ def overview(results: Mapping[str, Result]) -> Html:
     return _scrolled("All results", tag("table", head, tag("tbody", *body)))
 
 
-def facts(said: Mapping[str, Any]) -> Html:
+def facts(values: Mapping[str, Any]) -> Html:
     """Names and values as they were saved; nested ones as in matcher.K."""
     pairs = [
-        (key, value if isinstance(value, str) else json.dumps(value)) for key, value in flat(said).items()
+        (key, value if isinstance(value, str) else json.dumps(value)) for key, value in flat(values).items()
     ]
     return tag("dl", *(join(tag("dt", key), tag("dd", value)) for key, value in pairs))
 
@@ -222,9 +222,9 @@ def _block_head(
     top, under = [], []
     for kind in kinds:
         name, sensor = kind
-        told = tag("small", sensor) if inputs.count(name) > 1 else None
+        beside = tag("small", sensor) if inputs.count(name) > 1 else None
         span = 2 if kind in printed else 1
-        top.append(tag("th", name, told, scope="colgroup", class_="group", colspan=span))
+        top.append(tag("th", name, beside, scope="colgroup", class_="group", colspan=span))
         under.append(tag("th", "ours", scope="col", class_="group"))
         under.append(tag("th", "paper", scope="col") if kind in printed else Html())
     first = [tag("th", word, scope="col", rowspan=2) for word in words]

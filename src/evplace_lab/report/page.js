@@ -210,7 +210,7 @@ function look(place, result) {
   const count = result.item.length;
   const far = errors(result);
   const slider = element("input", { type: "range", min: 0, max: count - 1, value: 0, "aria-label": "Query" });
-  const words = element("output", { "aria-live": "polite" });
+  const readout = element("output", { "aria-live": "polite" });
   const marks = [];
   const show = (query) => {
     slider.value = query;
@@ -218,7 +218,7 @@ function look(place, result) {
     const item = result.item[query] < 0 ? "no item" : `item ${result.item[query]}`;
     const kind = data.outcomes[result.outcome[query]];
     const off = far[query] === null ? "" : `, ${far[query].toFixed(0)} m off`;
-    words.textContent = `Query ${query}: ${item}, ${kind ? WORDS[kind] : "not judged"}${off}`;
+    readout.textContent = `Query ${query}: ${item}, ${kind ? WORDS[kind] : "not judged"}${off}`;
   };
   slider.addEventListener("input", () => show(Number(slider.value)));
   const parts = [
@@ -233,7 +233,7 @@ function look(place, result) {
     element("h3", {}, "Versions"), pairs(result.versions));
   place.replaceChildren(
     figures(result),
-    element("div", { class: "along" }, slider, words),
+    element("div", { class: "along" }, slider, readout),
     element("div", { class: "grid-2" }, ...parts.map(([made]) => made)),
     ...(result.samples.length ? [element("h3", {}, "Sample matches"), samples(result)] : []),
     details,

@@ -63,14 +63,14 @@ function axes(place, box, x, y) {
   return { picture, atX, atY };
 }
 
-// Calls told(x, y), in the picture's own units, where the mouse moves or a finger touches.
-function whilePointing(picture, told) {
-  const tell = (event) => {
+// Calls onMove(x, y), in the picture's own units, where the mouse moves or a finger touches.
+function whilePointing(picture, onMove) {
+  const follow = (event) => {
     const box = picture.getBoundingClientRect();
-    told(event.clientX - box.left, event.clientY - box.top);
+    onMove(event.clientX - box.left, event.clientY - box.top);
   };
-  picture.addEventListener("pointermove", tell);
-  picture.addEventListener("pointerdown", tell);
+  picture.addEventListener("pointermove", follow);
+  picture.addEventListener("pointerdown", follow);
 }
 
 // How the curves of each input are drawn, and the paper's, which are dashed.
@@ -93,7 +93,7 @@ function spot(parent, [cx, cy], line, look) {
 function curvePlot(place, panel) {
   const lines = panel.lines.filter((line) => line.points.length);
   const canvas = element("div", { class: "canvas" });
-  const told = element("output", { "aria-live": "polite" });
+  const readout = element("output", { "aria-live": "polite" });
   const legend = element("div", { class: "legend" });
   const hidden = new Set();
   const looks = lines.map((line) => ({ stroke: `var(--c${line.colour % 8})`, ...STYLES[line.style] }));
@@ -114,8 +114,8 @@ function curvePlot(place, panel) {
     });
     legend.append(button);
   });
-  place.append(canvas, told, legend);
-  told.textContent = hint;
+  place.append(canvas, readout, legend);
+  readout.textContent = hint;
 
   const redraw = drawn(canvas, (width) => {
     const unit = { low: 0, high: 1, step: 0.2 };
@@ -142,12 +142,12 @@ function curvePlot(place, panel) {
       cursor.setAttribute("cy", spot.at[1]);
       cursor.setAttribute("visibility", "visible");
       const at = value === null ? "" : `, ${line.parameter} ${short(value)}`;
-      told.textContent = `${line.label}: recall ${recall.toFixed(3)}, precision ${precision.toFixed(3)}${at}`;
+      readout.textContent = `${line.label}: recall ${recall.toFixed(3)}, precision ${precision.toFixed(3)}${at}`;
     };
     const leave = () => {
       chosen = null;
       cursor.setAttribute("visibility", "hidden");
-      told.textContent = hint;
+      readout.textContent = hint;
     };
     whilePointing(plot.picture, (x, y) => {
       const far = (spot) => Math.hypot(spot.at[0] - x, spot.at[1] - y);

@@ -36,17 +36,17 @@ def test_events_by_default_and_colours(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("line", "words"),
     [
         ("dataset/images/6.jpg 1 2 3 4 5 6\n", "names 1 images that .* lacks, first 6.jpg"),
         ("dataset/images/0.jpg 1 2 3\n", "line 7: an image's name and six numbers"),
         ("dataset/images/0.jpg 1 nan 3 4 5 6\n", "line 7: the pose is not a number"),
     ],
 )
-def test_poses_that_do_not_fit(tmp_path: Path, line: str, said: str) -> None:
+def test_poses_that_do_not_fit(tmp_path: Path, line: str, words: str) -> None:
     poses = write_gta(tmp_path) / "6dpose_list.txt"
     poses.write_text(poses.read_text() + line)
-    with pytest.raises((TrackError, TraverseError), match=said):
+    with pytest.raises((TrackError, TraverseError), match=words):
         open_drive(tmp_path)
 
 

@@ -64,7 +64,7 @@ def test_images_of_several_sizes_and_folders(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("names", "said"),
+    ("names", "words"),
     [
         ([SAN_FRANCISCO, "@0544388.51@4172758.25@11@S"], r"mixes UTM zones: 10S in .*, 11S in "),
         ([SAN_FRANCISCO, "@0544388.51@4172758.25"], r"mixes UTM zones: 10S in .*, none in "),
@@ -78,9 +78,9 @@ def test_images_of_several_sizes_and_folders(tmp_path: Path) -> None:
         (["@0544388.51@99172758.25@10@S"], "lies outside its UTM zone"),
     ],
 )
-def test_names_that_cannot_be_used(tmp_path: Path, names: list[str], said: str) -> None:
+def test_names_that_cannot_be_used(tmp_path: Path, names: list[str], words: str) -> None:
     write_utm(tmp_path, "database", names)
-    with pytest.raises(TrackError, match=said):
+    with pytest.raises(TrackError, match=words):
         open_drive(tmp_path)
 
 

@@ -5,10 +5,11 @@ import platform
 
 import numpy as np
 import pytest
+from made_town import made_town
 
 from evplace.core import grey as plain_grey
 from evplace.sources.simulators.motion import image_motion
-from evplace_lab.city import Film, build_town
+from evplace_lab.city import Film
 from evplace_lab.city.camera import ColourCamera, grey, luminance
 from evplace_lab.city.conditions import CONDITIONS
 from evplace_lab.city.figures import STRIDES, car, person
@@ -23,7 +24,7 @@ VIEW = View((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)
 
 @pytest.fixture(scope="module")
 def town() -> Town:
-    return build_town(0)
+    return made_town()
 
 
 def clutter() -> Primitives:

@@ -4,6 +4,7 @@ import hashlib
 
 import numpy as np
 import pytest
+from made_town import made_town
 
 from evplace.core.errors import SettingsError
 from evplace_lab.city import build_town
@@ -21,7 +22,7 @@ from evplace_lab.city.town import Town
 
 @pytest.fixture(scope="module")
 def town() -> Town:
-    return build_town(0)
+    return made_town()
 
 
 def test_a_seed_gives_one_town(town: Town) -> None:

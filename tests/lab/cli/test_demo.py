@@ -32,8 +32,8 @@ def drives(tmp_path: Path, day: Traverse, night: Traverse, monkeypatch: pytest.M
 
 def test_the_demo_keeps_what_it_prints(drives: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["demo", "--out", f"{drives}/demo"]) == 0
-    said = capsys.readouterr().out
-    assert "import evplace as ev" in said
+    output = capsys.readouterr().out
+    assert "import evplace as ev" in output
     rows = json.loads((drives / "demo" / "result.json").read_text())["rows"]
     assert len(rows) == len(demo.QUERIES) * len(demo.MATCHERS) * len(demo.INPUTS)
     assert set(rows[0]) >= {"query", "input", "matcher", "accuracy", "accuracy_seen", "rejected", "n"}

@@ -32,9 +32,9 @@ def test_results_become_a_page(results: Path, tmp_path: Path, capsys: Capture) -
     pytest.importorskip("matplotlib", reason="plots need the extra 'report'")
     assert (results / "best" / "pr_curve.png").read_bytes().startswith(b"\x89PNG")
     assert main(["report", str(results)]) == 0
-    said = capsys.readouterr().out
-    assert f"{results}/report.html: open it" in said
-    assert f"{results}/report-route.png" in said
+    output = capsys.readouterr().out
+    assert f"{results}/report.html: open it" in output
+    assert f"{results}/report-route.png" in output
     assert main(["report", f"{results}/best", "-o", f"{tmp_path}/best.html", "--json"]) == 0
     written = json.loads(capsys.readouterr().out)
     assert written["page"] == f"{tmp_path}/best.html"
@@ -47,9 +47,9 @@ def test_faults_are_one_line(results: Path, tmp_path: Path, capsys: Capture) -> 
     cases = {"none": "no folder", "empty": "nothing to report on", ".": "newer version"}
     for name, words in cases.items():
         assert main(["report", str(tmp_path / name)]) == 2
-        told = capsys.readouterr().err
-        assert words in told
-        assert len(told.splitlines()) == 1
+        message = capsys.readouterr().err
+        assert words in message
+        assert len(message.splitlines()) == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["empty", "table2.json"]
 
 

@@ -18,7 +18,7 @@ def test_a_whole_run(tmp_path: Path) -> None:
     assert found.name == "run"
     assert found.table is not None
     assert len(found.table.rows) == 2 * 2 * len(QUERIES) * 3
-    assert found.table.said["took_s"] == 321.5
+    assert found.table.rest["took_s"] == 321.5
     assert found.curves is not None
     assert (len(found.curves.rows), len(found.curves.others)) == (4, 4)
     assert found.ablations is not None
@@ -54,7 +54,7 @@ def test_what_is_no_folder_or_holds_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "words"),
     [
         ({"format": "evplace-table-2"}, "made by a newer version"),
         ({"format": "evplace-curves-1"}, "not evplace-table-1"),
@@ -68,11 +68,11 @@ def test_what_is_no_folder_or_holds_nothing(tmp_path: Path) -> None:
         ({"rows": [{"query": "q", "input": "e", "matcher": "m", "mean": True}]}, "the mean True"),
     ],
 )
-def test_a_damaged_table(tmp_path: Path, change: dict[str, Any], said: str) -> None:
+def test_a_damaged_table(tmp_path: Path, change: dict[str, Any], words: str) -> None:
     (tmp_path / "table2.json").write_text(json.dumps(table2() | change))
-    with pytest.raises(InputError, match=said) as told:
+    with pytest.raises(InputError, match=words) as raised:
         look(tmp_path)
-    assert "table2.json" in str(told.value)
+    assert "table2.json" in str(raised.value)
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{", "\x00"])
@@ -85,10 +85,10 @@ def test_files_that_are_no_json(tmp_path: Path, content: str) -> None:
 
 
 def test_damaged_curves(tmp_path: Path) -> None:
-    for points, said in [([[1, 2]], "3 numbers are wanted"), (3, "no list"), ([["a", 1, 1]], "'a'")]:
+    for points, words in [([[1, 2]], "3 numbers are wanted"), (3, "no list"), ([["a", 1, 1]], "'a'")]:
         curves = {"format": "evplace-curves-1", "curves": [{"panel": "p", "points": points}]}
         (tmp_path / "figure5.json").write_text(json.dumps(curves))
-        with pytest.raises(InputError, match=said):
+        with pytest.raises(InputError, match=words):
             look(tmp_path)
 
 

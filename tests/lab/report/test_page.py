@@ -121,8 +121,8 @@ def test_only_event_images_become_ink_on_paper(kind: str, turned: bool) -> None:
     result = make_result()
     assert result.samples is not None
     dark = dataclasses.replace(result.samples, images=np.zeros_like(result.samples.images))
-    told = dataclasses.replace(result, settings={"map": {"input": kind}}, samples=dark)
-    ((_, sources), *_) = sample_images({"r": told})["r"]
+    shaded = dataclasses.replace(result, settings={"map": {"input": kind}}, samples=dark)
+    ((_, sources), *_) = sample_images({"r": shaded})["r"]
     picture = Image.open(io.BytesIO(base64.b64decode(sources[0].partition(",")[2])))
     assert np.asarray(picture.convert("L"))[0, 0] == (255 if turned else 0)
 
@@ -130,8 +130,8 @@ def test_only_event_images_become_ink_on_paper(kind: str, turned: bool) -> None:
 def test_names_cannot_become_markup(tmp_path: Path) -> None:
     run = write_run(tmp_path / "run", results=0)
     for sheet in run.glob("*.json"):
-        said = json.loads(sheet.read_text()) | {EVIL: EVIL, "title": EVIL}
-        changed = json.dumps(said)
+        content = json.loads(sheet.read_text()) | {EVIL: EVIL, "title": EVIL}
+        changed = json.dumps(content)
         for word in ("night-1", "ideal", "Algorithm 1", "SeqSLAM", "no blur", "better", "day-night", "tau1"):
             changed = changed.replace(f'"{word}"', json.dumps(EVIL))
         sheet.write_text(changed)

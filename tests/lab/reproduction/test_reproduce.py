@@ -74,14 +74,14 @@ def test_results_of_other_settings_are_not_taken_for_ours(
 
 
 def test_the_papers_numbers_stand_beside_ours(table: dict[str, Any]) -> None:
-    told = {
+    printed = {
         (row["query"], row["matcher"]): row["paper"]
         for row in table["rows"]
         if row["input"] == "events" and row["rule"] == "places" and row["paper"] is not None
     }
-    assert told["night-1", "global-max"] == 85.80
-    assert told["rain-2", "graph, alpha 0.1"] == 37.91
-    assert len(told) == 25
+    assert printed["night-1", "global-max"] == 85.80
+    assert printed["rain-2", "graph, alpha 0.1"] == 37.91
+    assert len(printed) == 25
     assert all(row["paper"] is None for row in table["rows"] if row["rule"] == "view")
 
 

@@ -108,11 +108,11 @@ def test_damage_that_the_decoder_may_not_survive(form: str, kind: str, tmp_path:
         worker = [sys.executable, str(Path(damage.__file__)), *arguments]
         try:
             answer = subprocess.run(worker, capture_output=True, text=True, timeout=HANG_S + count)
-            said, survived = answer.stdout, answer.returncode >= 0
+            output, survived = answer.stdout, answer.returncode >= 0
             assert answer.returncode <= 0, answer.stderr[-2000:]
         except subprocess.TimeoutExpired as late:
-            said, survived = (late.stdout or b"").decode(), False
-        first = int(said.split()[-1]) + 1
+            output, survived = (late.stdout or b"").decode(), False
+        first = int(output.split()[-1]) + 1
         if not survived:
             bad = tmp_path / f"bad{path.suffix}"
             bad.write_bytes(damage.damaged(data, kind, SEED, first - 1, count))

@@ -185,7 +185,7 @@ def test_thresholds_spread_from_pixel_to_pixel_and_belong_to_the_seed() -> None:
     assert not np.array_equal(noise[0].t_us[:50], noise[1].t_us[:50])
 
 
-def test_more_events_than_there_is_room_for() -> None:
+def test_more_events_than_the_buffer_first_holds() -> None:
     sensor = Simulator((8, 8), SensorSettings(0.01, 0.01, 0.0, noise_hz=0.0, refractory_us=0, log_eps=1e-3))
     dark, bright = np.zeros((8, 8)), np.full((8, 8), 50.0)
     sensor.push(dark, 0)

@@ -103,7 +103,7 @@ class Simulator:
         self._fired_us = np.full(shape, np.iinfo(np.int64).min // 2, np.int64)
         self._table = log_table(self.settings.log_eps)
         self._t_us = 0
-        self._room = _Room(size[0] * size[1])
+        self._buffer = _Buffer(size[0] * size[1])
 
     def push(self, frame: Frame, t_us: int) -> Events:
         """The events after the last frame, up to this one, in the order of time; none for the first.
@@ -127,10 +127,10 @@ class Simulator:
         if leak:
             self._level -= np.float32(leak)
         count += self._add_noise(new, count, t_us)
-        return self._room.sorted(count, self._t_us, t_us, self.size)
+        return self._buffer.sorted(count, self._t_us, t_us, self.size)
 
     def _cross(self, new: LogLight, t_us: int, leak: float) -> int:
-        """Fill the room with the crossings of one interval; more room is made where it does not do."""
+        """Collect the crossings of one interval; the buffer grows where it is too small."""
         at, count = 0, 0
         while True:
             at, count = _crossings(
@@ -146,11 +146,11 @@ class Simulator:
                 self.settings.refractory_us,
                 at,
                 count,
-                *self._room.arrays,
+                *self._buffer.arrays,
             )
             if at == new.size:
                 return int(count)
-            self._room.grow()
+            self._buffer.grow()
 
     def _add_noise(self, new: LogLight, count: int, t_us: int) -> int:
         """Events without cause, evenly in the interval; returns how many."""
@@ -167,7 +167,7 @@ class Simulator:
         total = len(where)
         if not total:
             return 0
-        self._room.put(
+        self._buffer.put(
             count,
             self._rng.integers(1, t_us - self._t_us + 1, total),
             where % self.size[0],
@@ -203,7 +203,7 @@ class Simulator:
             )
 
 
-class _Room:
+class _Buffer:
     """Where the events of one interval are collected: grows, and is used again."""
 
     def __init__(self, capacity: int) -> None:
@@ -215,7 +215,7 @@ class _Room:
         return self._dt, self._x, self._y, self._p
 
     def grow(self) -> None:
-        """Twice the room; what is in it stays."""
+        """Twice the capacity; what is in it stays."""
         old = self.arrays
         self._allocate(2 * len(self._dt))
         self.put(0, *old)
@@ -349,7 +349,7 @@ def _crossings(
     ys: NDArray[np.uint16],
     ps: NDArray[np.bool_],
 ) -> tuple[int, int]:
-    """Crossings of all pixels from `first` on; stops before a pixel that the room may not hold.
+    """Crossings of all pixels from `first` on; stops before a pixel whose events may not fit.
 
     Returns the next pixel and the number of events. The leak lifts the signal in the interval; the caller
     lowers the level by as much afterwards, which is the same.
