@@ -27,7 +27,9 @@ def main(argv: list[str] | None = None) -> int:
     try:
         return _run(arguments)
     except EvplaceError as error:
-        print(f"evplace: {error}", file=sys.stderr)
+        from evplace.cli._output import note
+
+        note(str(error))
         return 2
     except KeyboardInterrupt:
         print("evplace: interrupted; nothing half-written was left", file=sys.stderr)

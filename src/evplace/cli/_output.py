@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import re
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,6 +15,13 @@ Show = Callable[[int, int, str], None]
 """Moves a progress bar: (done, total, remark)."""
 USED_GOOD_PART = 3
 """Exit code where a recording is damaged and its good part was used."""
+
+
+def in_flags(text: str) -> str:
+    """What the library says of its arguments, such as `time_unit=us`, as a command line has it."""
+    return re.sub(
+        r"\b(size|time_unit|stream|columns)=", lambda found: f"--{found[1].replace('_', '-')} ", text
+    )
 
 
 def print_json(value: object) -> None:
@@ -43,7 +51,7 @@ def print_facts(title: str, facts: Mapping[str, object]) -> None:
 
 def note(text: str) -> None:
     """A remark beside the answer: on standard error."""
-    print(f"evplace: {text}", file=sys.stderr)
+    print(f"evplace: {in_flags(text)}", file=sys.stderr)
 
 
 def note_guesses(notes: object) -> None:
@@ -94,7 +102,7 @@ def _text(value: object) -> str:
         return ", ".join(f"{inner:,} {name}" for name, inner in value.items() if inner) or "none"
     if isinstance(value, int) and not isinstance(value, bool):
         return f"{value:,}"
-    return "-" if value is None else str(value)
+    return "-" if value is None else in_flags(str(value))
 
 
 def _plain(value: Any) -> Any:

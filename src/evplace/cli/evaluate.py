@@ -18,6 +18,7 @@ from typing import Annotated, Literal
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
+from evplace.cli._recording import RecordingFlags
 from evplace.cli._track import TrackFlags
 from evplace.core import settings
 from evplace.core.errors import MissingExtraError, SettingsError
@@ -41,7 +42,7 @@ SHOWN = (
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags):
+class Args(TrackFlags, RecordingFlags):
     """Flags of `evplace evaluate`."""
 
     map: tyro.conf.Positional[Path]
@@ -68,10 +69,6 @@ class Args(TrackFlags):
     """The traverse that a network's map was learned from: lends the images of the sample matches."""
     scores: bool = False
     """Keep the score rows in the result."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -111,7 +108,7 @@ def _opened(args: Args, where: Localizer) -> Traverse:
     images = settings.make(ImageSettings, where.map.settings.get("images") or {})
     return open_traverse(
         args.drive, args.opened_track(), windows, images, args.size, args.time_unit, where.cleaning,
-        mask=where.mask, kind=where.map.settings.get("input"),
+        mask=where.mask, kind=where.map.settings.get("input"), stream=args.stream, columns=args.columns,
     )  # fmt: skip
 
 

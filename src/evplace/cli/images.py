@@ -22,6 +22,7 @@ from typing import Annotated, Any, Literal, TypeVar
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
+from evplace.cli._recording import RecordingFlags
 from evplace.cli._track import TrackFlags
 from evplace.core.errors import SettingsError
 from evplace.core.storage import check_new_file
@@ -42,17 +43,13 @@ S = TypeVar("S", WindowSettings, ImageSettings)
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags):
+class Args(TrackFlags, RecordingFlags):
     """Flags of `evplace images`."""
 
     source: tyro.conf.Positional[Path]
     """An event recording, a video, a folder of images, or a data set's folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The traverse folder to write."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     drive: str | None = None
     """For a data set: which drive."""
     dataset: str | None = None
@@ -116,7 +113,10 @@ def run(args: Args) -> int:
 def _record(args: Args, writer: TraverseWriter) -> str | None:
     """Write the images; returns what broke off, if anything."""
     fps = args.fps if "fps" in args.given else None
-    drive = open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps)
+    drive = open_source(
+        args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps, args.stream,
+        args.columns,
+    )  # fmt: skip
     _check_meant(args, drive)
     windows, images = _over(drive.windows, args.windows, args), _over(drive.images, args.images, args)
     with remarks():

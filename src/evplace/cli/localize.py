@@ -17,11 +17,12 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
+from evplace.cli._recording import RecordingFlags
 from evplace.core import settings
 from evplace.core.errors import DamagedRecordingError
 from evplace.core.storage import new_file
@@ -29,13 +30,12 @@ from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
 from evplace.sources.cleaning import pixel_mask
-from evplace.sources.readers import open_recording
 
 COLUMNS = ("t_us", "place", "easting", "northing", "score", "state")
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(RecordingFlags):
     """Flags of `evplace localize`."""
 
     map: tyro.conf.Positional[Path]
@@ -52,10 +52,6 @@ class Args:
     """Write a .csv file instead of standard output."""
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -73,7 +69,7 @@ class _Drive:
         if (self._args.drive / "traverse.json").exists():
             yield from self._where.match_traverse(Traverse.load(self._args.drive))
             return
-        recording = open_recording(self._args.drive, self._args.size, time_unit=self._args.time_unit)
+        recording = self._args.opened(self._args.drive)
         note_guesses(recording.notes)
         where = self._where
         where.mask = pixel_mask(recording.packets(), recording.size, where.cleaning, where.mask)

@@ -20,6 +20,7 @@ from typing import Annotated, Literal
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
+from evplace.cli._recording import RecordingFlags
 from evplace.cli._track import TrackFlags
 from evplace.core import settings as settings_room
 from evplace.core.errors import TraverseError
@@ -37,7 +38,7 @@ from evplace.sources.cleaning import CleaningSettings
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags):
+class Args(TrackFlags, RecordingFlags):
     """Flags of `evplace train`."""
 
     drive: tyro.conf.Positional[Path]
@@ -65,10 +66,6 @@ class Args(TrackFlags):
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
     settings: Path | None = None
     """A TOML file with any of these settings; train, windows, images, cleaning and spacing are its tables."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -81,7 +78,7 @@ def run(args: Args) -> int:
     scorer_settings = checked_settings(args.scorer, settings_room.from_pairs(args.set))
     day = open_traverse(
         args.drive, args.opened_track(), args.windows, args.images, args.size, args.time_unit,
-        args.cleaning, args.spacing, args.mask,
+        args.cleaning, args.spacing, args.mask, stream=args.stream, columns=args.columns,
     )  # fmt: skip
     places = _places(args, day)
     began = time.monotonic()

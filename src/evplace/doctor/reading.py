@@ -67,7 +67,7 @@ def _remarks(notes: list[str]) -> Finding:
     return Finding(
         "remarks", "look", len(notes), "",
         f"The reader remarks: {'; '.join(notes)}.",
-        "where that is wrong, give --size WIDTH HEIGHT or --time-unit",
+        "where that is wrong, give --size WIDTH HEIGHT, --time-unit, --stream or --columns",
     )  # fmt: skip
 
 

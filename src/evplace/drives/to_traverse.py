@@ -52,6 +52,8 @@ def open_traverse(
     drive: str | None = None,
     dataset: str | None = None,
     kind: Kind | None = None,
+    stream: str | None = None,
+    columns: str | None = None,
 ) -> Traverse:
     """A traverse folder, an event recording, a video, a folder of images or a data set, as `path` is.
 
@@ -61,10 +63,10 @@ def open_traverse(
     colour where they have colours).
 
     Recordings and images are turned into images in memory; for long ones, write a traverse folder with
-    `evplace images` first. `track` is a GPS log, or a Track; `size` and `time_unit` are
-    for recordings that do not say (see `open_recording`). `mask` names pixels of the recording to leave out
-    (see `evplace.sources.cleaning.read_mask`), besides what `cleaning` says. InputError where something
-    cannot be read, or where a traverse folder was cleaned or spaced in another way than is asked for.
+    `evplace images` first. `track` is a GPS log, or a Track; `size`, `time_unit`, `stream` and `columns` are
+    for recordings that do not say (see `open_recording`). `mask` names pixels to leave out (see
+    `evplace.sources.cleaning.read_mask`), besides what `cleaning` says. InputError where something cannot be
+    read, or where a traverse folder was cleaned or spaced in another way than is asked for.
     """
     if (Path(path) / "traverse.json").exists():
         found = Traverse.load(path)
@@ -74,7 +76,7 @@ def open_traverse(
     with tempfile.TemporaryDirectory(prefix="evplace-") as folder:
         writer = TraverseWriter(Path(folder), {})
         try:
-            source = open_source(path, size, time_unit, drive, dataset)
+            source = open_source(path, size, time_unit, drive, dataset, stream=stream, columns=columns)
             record(source, writer, track, windows, images, cleaning, spacing, mask, kind)
             writer.close()
         finally:
@@ -91,15 +93,19 @@ def open_source(
     dataset: str | None = None,
     listing: str | Path | None = None,
     fps: float | None = None,
+    stream: str | None = None,
+    columns: str | None = None,
 ) -> Drive:
     """What `path` holds, as a drive: see `open_traverse`; `listing` and `fps` as in `open_frames`.
 
-    A folder is a data set where it has the layout of one, whatever else lies in it. `size` and `time_unit`
-    are for a recording, `drive` and `dataset` for a data set's folder, `listing` and `fps` for a folder of
-    images; SettingsError where one is given that has no meaning for what `path` is.
+    A folder is a data set where it has the layout of one, whatever else lies in it. `size`, `time_unit`,
+    `stream` and `columns` are for a recording, `drive` and `dataset` for a data set's folder, `listing` and
+    `fps` for a folder of images; SettingsError where one is given that has no meaning for what `path` is.
     """
     place = Path(path)
-    of_recordings: dict[str, object] = {"--size": size, "--time-unit": time_unit}
+    of_recordings: dict[str, object] = {
+        "--size": size, "--time-unit": time_unit, "--stream": stream, "--columns": columns,
+    }  # fmt: skip
     of_images: dict[str, object] = {"--list": listing, "--fps": fps}
     is_folder = place.is_dir() and not is_recording(place)
     if drive is not None or dataset is not None or (is_folder and datasets.matching(place)):
@@ -113,7 +119,7 @@ def open_source(
             _refuse(f"{images} holds images, which have their own size", of_recordings)
             return Drive(_listed_film(images, listing, fps))
     _refuse(f"{place} is no folder of images", of_images)
-    return Drive(_recording(place, size, time_unit))
+    return Drive(_recording(place, size, time_unit, stream, columns))
 
 
 def record(
@@ -233,9 +239,11 @@ def _listed_film(folder: Path, listing: str | Path | None, fps: float | None) ->
     return film_of(folder, frames)
 
 
-def _recording(place: Path, size: Size | None, time_unit: str | None) -> Recording:
+def _recording(
+    place: Path, size: Size | None, time_unit: str | None, stream: str | None, columns: str | None
+) -> Recording:
     try:
-        return open_recording(place, size, time_unit=time_unit)
+        return open_recording(place, size, time_unit=time_unit, stream=stream, columns=columns)
     except RecordingError as error:
         if not place.is_file() or not place.stat().st_size or is_recording(place):
             raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import sqlite3
 import struct
 from collections.abc import Callable
@@ -102,15 +103,22 @@ def aedat3(folder: Path, events: Events) -> Path:
 
 
 def ros2_mcap(folder: Path, events: Events) -> Path:
+    return mcap_topics(folder, {"/events": packet_messages(events, aligned=True)})
+
+
+def mcap_topics(folder: Path, topics: dict[str, list[bytes]]) -> Path:
+    """Event packets of several topics, in turn."""
     writer: Any = pytest.importorskip("mcap.writer")
     path = folder / "made.mcap"
     with path.open("wb") as file:
         out = writer.Writer(file, chunk_size=4000, compression=writer.CompressionType.ZSTD)
         out.start("ros2", "test")
-        kind = "event_camera_msgs/msg/EventPacket"
-        channel = out.register_channel("/events", "cdr", out.register_schema(kind, "ros2msg", b""))
-        for message in packet_messages(events, aligned=True):
-            out.add_message(channel, log_time=0, publish_time=0, data=message)
+        schema = out.register_schema("event_camera_msgs/msg/EventPacket", "ros2msg", b"")
+        channels = [out.register_channel(topic, "cdr", schema) for topic in topics]
+        for turn in itertools.zip_longest(*topics.values()):
+            for channel, message in zip(channels, turn, strict=True):
+                if message is not None:
+                    out.add_message(channel, log_time=0, publish_time=0, data=message)
         out.finish()
     return path
 
@@ -167,30 +175,41 @@ def ros1(folder: Path, events: Events) -> Path:
 
 
 def ros1_bag(folder: Path, kind: str, messages: list[bytes]) -> Path:
+    return ros1_topics(folder, kind, {"/events": messages})
+
+
+def ros1_topics(folder: Path, kind: str, topics: dict[str, list[bytes]], index: bool = True) -> Path:
+    """A bag of several topics of one type, their messages in turn; without an index as if cut off."""
+
     def record(fields: dict[str, bytes], data: bytes) -> bytes:
         head = b"".join(
             struct.pack("<I", len(n) + 1 + len(v)) + n.encode() + b"=" + v for n, v in fields.items()
         )
         return struct.pack("<I", len(head)) + head + struct.pack("<I", len(data)) + data
 
-    connection = b"".join(
-        struct.pack("<I", len(text)) + text
-        for text in (b"topic=/events", b"type=" + kind.encode(), b"md5sum=*")
-    )
-    chunks = [record({"op": b"\7", "conn": b"\0\0\0\0", "topic": b"/events"}, connection)]
-    chunks += [record({"op": b"\2", "conn": b"\0\0\0\0", "time": b"\0" * 8}, message) for message in messages]
+    def connection(number: int, topic: str) -> bytes:
+        texts = (f"topic={topic}", f"type={kind}", "md5sum=*")
+        data = b"".join(struct.pack("<I", len(text)) + text.encode() for text in texts)
+        return record({"op": b"\7", "conn": struct.pack("<I", number), "topic": topic.encode()}, data)
+
+    used = [(number, topic) for number, topic in enumerate(topics) if topics[topic] or len(topics) == 1]
+    connections = [connection(number, topic) for number, topic in used]
+    chunks = list(connections)
+    for turn in itertools.zip_longest(*topics.values()):
+        for number, message in enumerate(turn):
+            if message is not None:
+                fields = {"op": b"\2", "conn": struct.pack("<I", number), "time": b"\0" * 8}
+                chunks.append(record(fields, message))
     body = b""
     for chunk in chunks:
         size = struct.pack("<I", len(chunk))
         body += record({"op": b"\5", "compression": b"none", "size": size}, chunk)
     start = b"#ROSBAG V2.0\n"
-    index = struct.pack("<Q", len(start) + 4096 + len(body))
-    top = record({"op": b"\3", "index_pos": index, "conn_count": b"\1\0\0\0"}, b"")
-    top = record({"op": b"\3", "index_pos": index, "conn_count": b"\1\0\0\0"}, b" " * (4096 - len(top)))
+    place = struct.pack("<Q", (len(start) + 4096 + len(body)) * index)
+    top = record({"op": b"\3", "index_pos": place, "conn_count": b"\1\0\0\0"}, b"")
+    top = record({"op": b"\3", "index_pos": place, "conn_count": b"\1\0\0\0"}, b" " * (4096 - len(top)))
     path = folder / "made.bag"
-    path.write_bytes(
-        start + top + body + record({"op": b"\7", "conn": b"\0\0\0\0", "topic": b"/e"}, connection)
-    )
+    path.write_bytes(start + top + body + b"".join(connections) * index)
     return path
 
 
@@ -199,16 +218,21 @@ def ros2_db3(folder: Path, events: Events) -> Path:
 
 
 def ros2_bag(folder: Path, kind: str, messages: list[bytes]) -> Path:
+    return ros2_topics(folder, kind, {"/events": messages})
+
+
+def ros2_topics(folder: Path, kind: str, topics: dict[str, list[bytes]]) -> Path:
+    """A bag of several topics of one type, their messages in turn."""
     path = folder / "made_0.db3"
     base = sqlite3.connect(path)
     base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL)")
     base.execute(
         "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)"
     )
-    base.execute("INSERT INTO topics VALUES (1, '/events', ?)", (kind,))
-    base.executemany(
-        "INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 0, ?)", [(m,) for m in messages]
-    )
+    base.executemany("INSERT INTO topics(name, type) VALUES (?, ?)", [(topic, kind) for topic in topics])
+    for turn in itertools.zip_longest(*topics.values()):
+        rows = [(number, message) for number, message in enumerate(turn, 1) if message is not None]
+        base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, 0, ?)", rows)
     base.commit()
     base.close()
     return path

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from made import ros1_bag, ros2_bag, some_events
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.errors import RecordingError, UnsupportedError
 from evplace.core.events import Events
 from evplace.sources.readers import open_recording
 
@@ -134,5 +134,5 @@ def test_the_encoding_libcaer_with_a_wrap_inside_a_packet(tmp_path: Path) -> Non
 
 def test_an_unknown_encoding_is_an_error_that_names_the_known(tmp_path: Path) -> None:
     path = ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [packet("evt9", 0, b"\0" * 8)])
-    with pytest.raises(DamagedRecordingError, match=r"evt9.*known are evt3, mono, libcaer"):
-        read(path)
+    with pytest.raises(UnsupportedError, match=r"evt9.*known are evt3, mono, libcaer"):
+        open_recording(path)

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import IO, Any
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 from evplace.core import errors
 from evplace.core.errors import DamagedRecordingError, EvplaceError
+from evplace.core.events import Size
 from evplace.sources.readers._source import Block, Hints, Source
 
 WORK_S = 8.0
@@ -44,8 +46,14 @@ def isolated(reader: str, path: Path, hints: Hints) -> Source:
     """What `evplace.sources.readers.<reader>.open_here(path, hints)` gives, decoded in a child process."""
     about = next(_Child(reader, path, hints, header_only=True).messages())
     assert isinstance(about, dict)
-    size = None if about["size"] is None else (int(about["size"][0]), int(about["size"][1]))
-    return Source(size, partial(_blocks, reader, path, hints), list(about["notes"]))
+    return Source(
+        _pair(about["size"]), partial(_blocks, reader, path, hints), about["notes"], streams=about["streams"]
+    )
+
+
+def _pair(size: list[int] | None) -> Size | None:
+    """A size as JSON holds it."""
+    return None if size is None else (size[0], size[1])
 
 
 def _blocks(reader: str, path: Path, hints: Hints) -> Iterator[Block]:
@@ -59,7 +67,7 @@ class _Child:
 
     def __init__(self, reader: str, path: Path, hints: Hints, header_only: bool) -> None:
         self._path = path
-        wanted = {"reader": reader, "path": str(path), "size": hints.size, "unit": hints.time_unit}
+        wanted = {"reader": reader, "path": str(path), "hints": asdict(hints)}
         code = f"import sys; sys.path[:] = {sys.path!r}; from {__name__} import serve; serve()"
         self._process = subprocess.Popen(
             [sys.executable, "-c", code, json.dumps(wanted | {"head": header_only})],
@@ -135,9 +143,11 @@ def serve() -> None:
     pipe = sys.stdout.buffer
     try:
         reader = importlib.import_module(f"evplace.sources.readers.{wanted['reader']}")
-        size = None if wanted["size"] is None else (wanted["size"][0], wanted["size"][1])
-        source: Source = reader.open_here(Path(wanted["path"]), Hints(size, wanted["unit"]))
-        _send(pipe, b"H", {"size": source.size, "notes": source.notes})
+        hints = wanted["hints"]
+        columns = None if hints["columns"] is None else tuple(hints["columns"])
+        known = Hints(_pair(hints["size"]), hints["time_unit"], hints["stream"], columns)
+        source: Source = reader.open_here(Path(wanted["path"]), known)
+        _send(pipe, b"H", {"size": source.size, "notes": source.notes, "streams": list(source.streams)})
         if not wanted["head"]:
             for block in source.blocks():
                 _send_block(pipe, block)

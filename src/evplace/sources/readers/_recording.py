@@ -42,12 +42,16 @@ class Recording:
     back_us: int
     """How far the furthest of the events dropped as backwards lay back."""
     notes: list[str]
-    """Guesses that were made, one plain sentence each."""
+    """Guesses and choices that were made, one plain sentence each."""
+    streams: list[str]
+    """The names of all streams of events in the file, the one that is read first; empty where a format has
+    but one, without a name."""
 
     def __init__(self, path: Path, format: str, source: Source, size: Size | None) -> None:
         self.path = path
         self.format = format
-        self.notes = list(source.notes)
+        self.streams = list(source.streams)
+        self.notes = _choice(self.streams) + list(source.notes)
         self._source = source
         self.size = self._decided_size(size)
         self._forget()
@@ -119,6 +123,14 @@ class Recording:
         inferred = _smallest_holding(self._source)
         self.notes.append(f"the file states no sensor size: {_text(inferred)} inferred from its events")
         return inferred
+
+
+def _choice(streams: list[str]) -> list[str]:
+    """What is read of several streams of events, and what is not."""
+    if len(streams) < 2:
+        return []
+    others = ", ".join(streams[1:])
+    return [f"events are read from {streams[0]}; there are also {others}: choose with stream=NAME"]
 
 
 def _smallest_holding(source: Source) -> Size:

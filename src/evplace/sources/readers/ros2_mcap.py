@@ -1,7 +1,7 @@
 """ROS 2 bags in MCAP files: a folder with its metadata.yaml, or one .mcap file. Checksums are verified.
 
-Layout: the MCAP specification (mcap.dev). Records are read from the start; the index at the end is not
-needed, so that a cut file gives all before the cut.
+Layout: the MCAP specification (mcap.dev). Records are read from the start, so that a cut file gives all
+before the cut; the summary at the end says which topics there are, and without it all messages are looked at.
 """
 
 from __future__ import annotations
@@ -15,14 +15,18 @@ from pathlib import Path
 from typing import BinaryIO
 
 from evplace.core.errors import DamagedRecordingError
-from evplace.sources.readers._ros import Bytes, Message, source
-from evplace.sources.readers._source import Hints, Source
+from evplace.sources.readers._ros import Bag, Bytes, Message, source
+from evplace.sources.readers._source import Hints, Source, printable
 from evplace.sources.readers._unpack import LIMIT, UnpackError, unpack
 
 ABOUT = "ROS 2 bag (MCAP) with event messages"
 MAGIC = b"\x89MCAP0\r\n"
-FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
+FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, STATISTICS = 0x02, 0x03, 0x04, 0x05, 0x06, 0x0B
 """Kinds of records that matter; the others are indexes and attachments."""
+TAIL = struct.Struct("<BQQQI8s")
+"""The end of a file: the footer with the place of the summary, and MAGIC."""
+FAULTS = (struct.error, ValueError, KeyError, OverflowError, UnpackError)
+"""What reading a damaged file raises."""
 
 
 class _Names:
@@ -41,8 +45,37 @@ def matches(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, hints: Hints) -> Source:
-    """The first topic with events; RecordingError where there is none."""
-    return source(path, partial(_messages, path), aligned=True)
+    """The wanted topic with events, else the first; UnsupportedError where there is none."""
+    return source(Bag(path, partial(_messages, path), _topics(path), aligned=True), hints)
+
+
+def _topics(path: Path) -> dict[str, str]:
+    """Topic -> type of all that have messages, from the summaries; empty where one is missing or damaged."""
+    found: dict[str, str] = {}
+    try:
+        for file in _files(path):
+            with file.open("rb") as opened:
+                found |= _summary(opened, file.stat().st_size)
+    except (*FAULTS, OSError):
+        return {}
+    return found
+
+
+def _summary(file: BinaryIO, size: int) -> dict[str, str]:
+    file.seek(size - TAIL.size)
+    kind, _, start, _, _, magic = TAIL.unpack(file.read(TAIL.size))
+    if kind != FOOTER or magic != MAGIC or not 0 < start < size:
+        raise ValueError("it has no summary")
+    names, counts = _Names(), b""
+    file.seek(start)
+    while (kind := (head := struct.unpack("<BQ", file.read(9)))[0]) != FOOTER:
+        data = file.read(min(head[1], size))
+        if kind == STATISTICS:
+            counts = data[46:]
+        elif kind in (SCHEMA, CHANNEL):
+            list(_taken(kind, data, names))
+    used = {number for number, count in struct.iter_unpack("<HQ", counts[: len(counts) // 10 * 10]) if count}
+    return dict(channel for number, channel in names.channels.items() if number in used)
 
 
 def _files(path: Path) -> list[Path]:
@@ -56,7 +89,7 @@ def _messages(path: Path) -> Iterator[Message]:
         try:
             with file.open("rb") as opened:
                 yield from _in_file(opened, file.stat().st_size)
-        except (struct.error, ValueError, KeyError, UnpackError) as error:
+        except FAULTS as error:
             raise DamagedRecordingError(f"{file} breaks off: {error}") from error
 
 
@@ -111,4 +144,5 @@ def _taken(kind: int, data: Bytes, names: _Names) -> Iterator[Message]:
 def _text(data: Bytes, position: int) -> tuple[str, int]:
     """A counted text and the byte after it."""
     length = struct.unpack_from("<I", data, position)[0]
-    return bytes(data[position + 4 : position + 4 + length]).decode("utf-8", "replace"), position + 4 + length
+    text = bytes(data[position + 4 : position + 4 + length]).decode("utf-8", "replace")
+    return printable(text), position + 4 + length
