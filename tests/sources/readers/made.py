@@ -51,15 +51,18 @@ def aedat2(folder: Path, events: Events) -> Path:
 
 
 def evt21(folder: Path, events: Events) -> Path:
+    path = folder / "made.raw"
+    path.write_bytes(b"% evt 2.1\n% geometry 240x180\n% end\n" + evt21_words(events).tobytes())
+    return path
+
+
+def evt21_words(events: Events) -> np.ndarray:
     """One word an event, and one with the high bits of the time before each."""
     t, x, y, p = (field.astype(np.uint64) for field in (events.t_us, events.x, events.y, events.p))
     high = np.uint64(8) << np.uint64(60) | t >> np.uint64(6) << np.uint64(32)
     event = p << np.uint64(60) | (t & np.uint64(63)) << np.uint64(54) | (x & ~np.uint64(31)) << np.uint64(43)
     event |= y << np.uint64(32) | np.uint64(1) << (x & np.uint64(31))
-    path = folder / "made.raw"
-    words = np.stack([high, event], 1).astype("<u8").tobytes()
-    path.write_bytes(b"% evt 2.1\n% geometry 240x180\n% end\n" + words)
-    return path
+    return np.stack([high, event], 1).astype("<u8").reshape(-1)
 
 
 def npz(folder: Path, events: Events) -> Path:
