@@ -30,6 +30,7 @@ ALIGNED = np.dtype(
 )  # fmt: skip
 """An event of an EventArray in ROS 2 that starts two bytes off a multiple of four; the next is STEP away."""
 STEP = 16
+MOVED = "times of a camera's own clock are moved: the first event has the stamp of its message"
 LITTLE_ENDIAN = b"\0\1"
 """How a message of plain CDR starts whose numbers stand low byte first."""
 
@@ -133,19 +134,17 @@ def _first(bag: Bag, wanted: str | None) -> Message:
 
 def _opened(bag: Bag, first: Message, streams: list[str]) -> Source:
     decode = _Packets if first.kind in PACKETS else _Arrays
+    probe = decode(bag.aligned)
     try:
         fields = Fields(first.data, bag.aligned)
         fields.header()
         height, width = fields.take("I"), fields.take("I")
-        decode(bag.aligned)(first.data)
+        probe(first.data)
     except (struct.error, ValueError) as error:
         raise RecordingError(f"{bag.path}: the first event message is damaged: {error}") from error
     size = (width, height) if 0 < width <= 1 << 16 and 0 < height <= 1 << 16 else None
-    notes = []
-    if first.kind in PACKETS:
-        notes.append("times of a camera's own clock are moved: the first event has the stamp of its message")
     return Source(
-        size, lambda: gathered(_decoded(bag, first.topic, decode(bag.aligned))), notes, streams=streams
+        size, lambda: gathered(_decoded(bag, first.topic, decode(bag.aligned))), probe.notes, streams=streams
     )
 
 
@@ -165,6 +164,7 @@ class _Packets:
         self._aligned = aligned
         self._encodings: dict[str, Encoding] = {}
         self._shift_us: int | None = None
+        self.notes: list[str] = []
 
     def __call__(self, data: Bytes) -> Block:
         fields = Fields(data, self._aligned)
@@ -174,6 +174,7 @@ class _Packets:
         base_ns = fields.take("Q")
         name = bytes(fields.raw()).rstrip(b"\0").decode("ascii", "replace")
         fields.take("B")
+        self.notes = [] if name in SINCE_EPOCH else [MOVED]
         block = self._encoding(name)(fields.raw(), base_ns)
         if self._shift_us is None and len(block.t_us):
             self._shift_us = 0 if name in SINCE_EPOCH else stamp_ns // 1000 - int(block.t_us[0])
@@ -195,6 +196,7 @@ class _Arrays:
 
     def __init__(self, aligned: bool) -> None:
         self._aligned = aligned
+        self.notes: list[str] = []
 
     def __call__(self, data: Bytes) -> Block:
         fields = Fields(data, self._aligned)
