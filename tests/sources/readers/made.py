@@ -72,6 +72,13 @@ def npz(folder: Path, events: Events) -> Path:
     return path
 
 
+def npy(folder: Path, events: Events) -> Path:
+    rows = np.zeros(len(events), [("x", "<u2"), ("y", "<u2"), ("t_us", "<i8"), ("p", "?")])
+    rows["t_us"], rows["x"], rows["y"], rows["p"] = events.t_us, events.x, events.y, events.p
+    np.save(folder / "made.npy", rows)
+    return folder / "made.npy"
+
+
 def hdf5(folder: Path, events: Events) -> Path:
     """The layout of DSEC, in chunks."""
     h5py: Any = pytest.importorskip("h5py")
@@ -251,6 +258,7 @@ MAKERS: dict[str, Callable[[Path, Events], Path]] = {
     "evt21": evt21,
     "evt3": _by_faery("made.raw", version="evt3"),
     "hdf5": hdf5,
+    "npy": npy,
     "npz": npz,
     "parquet": parquet,
     "ros1": ros1,

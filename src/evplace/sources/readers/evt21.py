@@ -26,8 +26,8 @@ WORDS = 1 << 17
 """Words decoded at a time; a word gives 32 events at most."""
 TIME_HIGH = 0x8
 """The kind of word that sends the upper bits of the time."""
-STEP = 1 << 14
-"""How far it goes from one such word to the next at most, in units of 64 us, where the clock runs: 1 s."""
+STEP = 1 << 27
+"""Half of its range: how far it goes from one such word to the next at most, where the clock runs."""
 POSITION = np.zeros(37, np.int64)
 """2 ** n modulo 37 -> n: the powers of two up to 2 ** 31 all leave another rest."""
 POSITION[[(1 << n) % 37 for n in range(32)]] = range(32)
@@ -63,7 +63,7 @@ def _order(path: Path, fields: dict[str, str], start: int) -> tuple[str, list[st
 
 
 def _steps(run: NDArray[np.uint64]) -> int:
-    """How many more of the words of time follow closely on the one before than do not, the first counted."""
+    """How many more of the words of time go on from the one before than go back, the first counted."""
     times = (run[run >> np.uint64(60) == TIME_HIGH] >> np.uint64(32)).astype(np.int64) & 0xFFFFFFF
     steps = np.diff(times) & 0xFFFFFFF
     return int(np.count_nonzero(steps <= STEP) - np.count_nonzero(steps > STEP)) + (len(times) > 0)
