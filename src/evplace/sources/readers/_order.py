@@ -1,8 +1,8 @@
 """Which column is which: as the caller says, by the columns' names, else by their values.
 
 By values: the polarity is -1, 0 or 1, the time rises, pixels are whole numbers, and x stands before y, unless
-only the other way round fits the sensor. What could be read in two ways is an error that asks; what was told by
-values is noted.
+only the other way round fits the sensor. What could be read in two ways is an error that asks; what was told
+by values is noted.
 """
 
 from __future__ import annotations
@@ -64,6 +64,10 @@ class Order(NamedTuple):
         if self.part is not None:
             named |= {self.t: "sec", self.part: "nsec" if self.part_ns == 1 else "usec"}
         return ",".join(named.get(column, "-") for column in range(count))
+
+    def note(self, count: int) -> str:
+        """What is to be said where the values told it."""
+        return f"columns are taken as {self.words(count)} by their values: where wrong, give columns=t,x,y,p"
 
 
 class UnclearError(ValueError):
@@ -171,9 +175,10 @@ def _time(free: list[_Column]) -> list[_Column]:
             return [first, second]
     rising = [column for column in free if column.rises and not column.signs]
     rising = [column for column in rising if not column.counts] or rising
-    rising = [column for column in rising if not column.pixels] or rising
+    beyond = [column for column in rising if not column.pixels]
     rising.sort(key=lambda column: -column.way)
-    return rising[:1] if len(rising) > 1 and rising[0].way > FARTHER * rising[1].way else rising
+    clear = not beyond and len(rising) > 1 and rising[0].way > FARTHER * rising[1].way
+    return beyond or (rising[:1] if clear else rising)
 
 
 def _seconds(first: _Column, second: _Column) -> bool:
@@ -204,7 +209,7 @@ def _pixels(
 
 
 def _turned(order: Order, columns: list[_Column], size: Size | None) -> Order:
-    """The order with y before x where only that fits the sensor; UnclearError for one taller than it is wide."""
+    """With y before x where only that fits the sensor; UnclearError for a sensor taller than wide."""
     first, second = columns[order.x].values, columns[order.y].values
     other = order._replace(x=order.y, y=order.x)
     if size is not None:

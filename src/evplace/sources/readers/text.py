@@ -217,11 +217,7 @@ def _which(
         np.frombuffer(rows[: rows.rfind(b"\n") + 1] or rows + b"\n", np.uint8), columns, 1 << 16
     )
     order = _order.by_values(whole + fraction / 1e9, found, size) if len(whole) else None
-    if order is None:
-        return None, []
-    return order, [
-        f"columns are taken as {order.words(columns)} by their values: where wrong, give columns=t,x,y,p"
-    ]
+    return (None, []) if order is None else (order, [order.note(columns)])
 
 
 def _time_sample(path: Path, layout: _Layout) -> NDArray[np.float64] | NDArray[np.int64]:
