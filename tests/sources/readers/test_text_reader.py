@@ -72,8 +72,8 @@ def test_a_line_that_is_no_event_is_named(tmp_path: Path) -> None:
 def lines(form: str) -> str:
     """A line for each event; `form` has i (its number), t in us, s in seconds, x, y, p and its sign."""
     return "".join(
-        form.format(i=i, t=t, s=t / 1e6, x=x, y=y, p=int(p), sign=2 * p - 1, **changed)
-        for i, (t, x, y, p) in rows
+        form.format(i=i, t=t, s=t / 1e6, x=x, y=y, p=int(p), sign=2 * p - 1)
+        for i, (t, x, y, p) in enumerate(ROWS)
     )
 
 
