@@ -25,7 +25,8 @@ RATES = (1e3, 1e9)
 SLOWEST = 2e4
 """Events a second below which whole numbers might be milliseconds or nanoseconds as well."""
 SLOW = 100.0
-"""Events a second below which whole numbers cannot be microseconds."""
+"""Events a second below which whole numbers cannot be microseconds, nor fractions of more than three places
+seconds: a camera's clock ticks in microseconds."""
 CENTURY_S = (946_684_800, 4_102_444_800)
 """Seconds from 1970 to the years 2000 and 2100."""
 NOWHERE = 0xFFFF
@@ -63,7 +64,8 @@ def _likely(times: NDArray[np.float64]) -> tuple[str, float, float]:
         if _since_1970(float(times[0]), unit) and RATES[0] <= rate <= RATES[1]:
             return unit, rate, RATES[0]
     if not whole:
-        return "s", rates["s"], RATES[0]
+        coarse = bool(np.allclose(times * 1e3, np.rint(times * 1e3), rtol=0, atol=1e-6))
+        return "s", rates["s"], RATES[0] if coarse else SLOW
     unit = "ns" if rates["us"] < SLOW and rates["ns"] >= SLOWEST else "us"
     return unit, rates[unit], SLOWEST
 

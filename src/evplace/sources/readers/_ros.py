@@ -1,7 +1,8 @@
 """Event messages of ROS 1 and ROS 2, whatever bag they stand in.
 
 Read are event_camera_msgs/EventPacket and dvs_msgs/EventArray (also under their older names). Serialisation:
-ROS 1 packs all fields; ROS 2 (CDR) aligns each to its own width and ends text with a zero byte.
+ROS 1 packs all fields; ROS 2 (CDR) aligns each to its own width and ends text with a zero byte. A message of
+ROS 2 may be packed with zstd.
 """
 
 from __future__ import annotations
@@ -17,8 +18,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
+from evplace.sources.readers._ros2_files import ZSTD
 from evplace.sources.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Encoding
 from evplace.sources.readers._source import Block, Hints, Source, gathered, joined, ordered, printable
+from evplace.sources.readers._unpack import UnpackError, unpack
 
 PACKETS = ("event_camera_msgs/EventPacket", "event_array_msgs/EventArray")
 ARRAYS = ("dvs_msgs/EventArray", "prophesee_event_msgs/EventArray")
@@ -31,6 +34,8 @@ ALIGNED = np.dtype(
 """An event of an EventArray in ROS 2 that starts two bytes off a multiple of four; the next is STEP away."""
 STEP = 16
 MOVED = "times of a camera's own clock are moved: the first event has the stamp of its message"
+FAULTS = (struct.error, ValueError, UnpackError)
+"""What decoding a damaged message raises."""
 LITTLE_ENDIAN = b"\0\1"
 """How a message of plain CDR starts whose numbers stand low byte first."""
 
@@ -136,11 +141,12 @@ def _opened(bag: Bag, first: Message, streams: list[str]) -> Source:
     decode = _Packets if first.kind in PACKETS else _Arrays
     probe = decode(bag.aligned)
     try:
-        fields = Fields(first.data, bag.aligned)
+        data = _plain(first.data, bag.aligned)
+        fields = Fields(data, bag.aligned)
         fields.header()
         height, width = fields.take("I"), fields.take("I")
-        probe(first.data)
-    except (struct.error, ValueError) as error:
+        probe(data)
+    except FAULTS as error:
         raise RecordingError(f"{bag.path}: the first event message is damaged: {error}") from error
     size = (width, height) if 0 < width <= 1 << 16 and 0 < height <= 1 << 16 else None
     return Source(
@@ -152,9 +158,14 @@ def _decoded(bag: Bag, topic: str, decode: Callable[[Bytes], Block]) -> Iterator
     for number, message in enumerate(bag.messages()):
         if message.topic == topic:
             try:
-                yield decode(message.data)
-            except (struct.error, ValueError) as error:
+                yield decode(_plain(message.data, bag.aligned))
+            except FAULTS as error:
                 raise DamagedRecordingError(f"{bag.path}: message {number} is damaged: {error}") from error
+
+
+def _plain(data: Bytes, aligned: bool) -> Bytes:
+    """A message as it was before it was packed; UnpackError where it is damaged."""
+    return unpack(bytes(data), "zstd") if aligned and data[:4] == ZSTD else data
 
 
 class _Packets:
