@@ -97,7 +97,7 @@ def _events(subject: Subject) -> Iterator[Events]:
                 subject.see_events(events)
                 yield events
     except DamagedRecordingError as error:
-        subject.fault = str(error)
+        subject.fault, subject.cause = str(error), error.__cause__ or error
 
 
 def _frames(subject: Subject, film: Film) -> Iterator[tuple[int, Frame]]:

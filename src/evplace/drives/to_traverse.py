@@ -18,6 +18,7 @@ from evplace.core.errors import (
     SettingsError,
     TrackError,
     TraverseError,
+    UnsupportedError,
 )
 from evplace.core.events import Size
 from evplace.drives import datasets
@@ -245,7 +246,8 @@ def _recording(
     try:
         return open_recording(place, size, time_unit=time_unit, stream=stream, columns=columns)
     except RecordingError as error:
-        if not place.is_file() or not place.stat().st_size or is_recording(place):
+        known = isinstance(error, UnsupportedError) or is_recording(place)
+        if not place.is_file() or not place.stat().st_size or known:
             raise
         raise RecordingError(f"{error}; videos are {', '.join(VIDEOS)}") from error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import sqlite3
 import struct
@@ -12,7 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from evplace.core.errors import DamagedRecordingError
 from evplace.core.events import Events
+from evplace.sources.readers import Recording
 
 SIZE = (240, 180)
 
@@ -24,6 +27,15 @@ def some_events(count: int = 3000, span_us: int = 100_000, seed: int = 0) -> Eve
     return Events.of(
         t_us, rng.integers(0, 240, count), rng.integers(0, 180, count), rng.random(count) < 0.5, SIZE
     )
+
+
+def good_part(recording: Recording) -> Events:
+    """What was delivered before the recording broke off or proved doubtful."""
+    packets = []
+    with contextlib.suppress(DamagedRecordingError):
+        for packet in recording.packets():
+            packets.append(packet)
+    return Events.concatenate(packets)
 
 
 def _by_faery(name: str, **options: Any) -> Callable[[Path, Events], Path]:

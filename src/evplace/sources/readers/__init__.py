@@ -22,8 +22,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from evplace.core import families as plugs
-from evplace.core.errors import RecordingError
+from evplace.core.errors import RecordingError, UnsupportedError
 from evplace.core.events import Size
+from evplace.sources.readers._foreign import foreign
 from evplace.sources.readers._source import Block, Hints, Source
 
 if TYPE_CHECKING:
@@ -70,6 +71,9 @@ def open_recording(
         raise RecordingError(f"{file} ({reader.ABOUT}) has no columns to tell apart: leave columns out")
     try:
         source: Source = reader.read(file, hints)
+    except UnsupportedError as error:
+        where = "" if str(file) in str(error) else f"{file}: "
+        raise UnsupportedError(f"{where}{error}") from error
     except OSError as error:
         raise RecordingError(f"cannot read {file} as {name}: {error.strerror or error}") from error
     if stream is not None and not source.streams:
@@ -130,5 +134,7 @@ def _found(path: Path, head: bytes, table: bool = False) -> str:
             return name
     if table and not path.is_dir():
         return "text"
+    if (what := foreign(path, head)) is not None:
+        raise UnsupportedError(f"{path} is {what}")
     what = "the folder" if path.is_dir() else "the content"
     raise RecordingError(f"{path}: {what} is of no known recording format: known are {', '.join(known)}")

@@ -12,7 +12,7 @@ import pyarrow
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.sources.readers import _columns, _order
 from evplace.sources.readers._source import Block, Hints, Source, printable
 
@@ -33,6 +33,8 @@ def open_here(path: Path, hints: Hints) -> Source:
         if order.part is not None:
             columns["part"] = names[order.part]
         unit, notes = _unit(path, columns, stated, hints) if order.part is None else ("s", [])
+    except pyarrow.ArrowNotImplementedError as error:
+        raise UnsupportedError(f"{path} is not read: {' '.join(str(error).split())}") from error
     except FAULTS as error:
         raise RecordingError(f"{path} is a damaged Parquet file: {' '.join(str(error).split())}") from error
     return Source(None, partial(_blocks, path, columns, unit, order.part_ns), notes)
@@ -80,5 +82,7 @@ def _blocks(path: Path, columns: dict[str, str], unit: str, part_ns: int) -> Ite
     try:
         for rows in _slices(path, columns):
             yield _columns.of_rows(rows, unit, part_ns)
+    except pyarrow.ArrowNotImplementedError as error:
+        raise UnsupportedError(f"{path} is not read: {' '.join(str(error).split())}") from error
     except FAULTS as error:
         raise DamagedRecordingError(f"{path} breaks off: {' '.join(str(error).split())}") from error

@@ -8,7 +8,10 @@ import io
 import lz4.frame
 import zstandard
 
-LIMIT = 1 << 28
+from evplace.core.errors import UnsupportedError
+from evplace.sources.readers._source import printable
+
+LIMIT = 1 << 26
 """Bytes that one packet may unpack to; those of real recordings are a few megabytes."""
 
 
@@ -17,11 +20,15 @@ class UnpackError(Exception):
 
 
 def unpack(data: bytes, method: str, limit: int = LIMIT) -> bytes:
-    """`data` unpacked by `method`: "none", "lz4", "zstd" or "bz2". Raises UnpackError."""
+    """`data` unpacked by `method`: "none", "lz4", "zstd" or "bz2".
+
+    UnpackError where it is damaged, UnsupportedError for another method.
+    """
     if method == "none":
         return data
     if method not in _METHODS:
-        raise UnpackError(f"unknown compression '{method}'")
+        known = ", ".join(_METHODS)
+        raise UnsupportedError(f"the compression '{printable(method)}' is not read: known are {known}")
     try:
         whole = _METHODS[method](data, limit)
     except (OSError, EOFError, RuntimeError, ValueError, zstandard.ZstdError) as error:

@@ -16,6 +16,7 @@ from evplace.core.errors import RecordingError
 from evplace.core.events import Size
 from evplace.sources.readers import _npy
 from evplace.sources.readers._source import Hints, Source
+from evplace.sources.readers._zip import members
 
 ABOUT = "numpy archive (.npz) with arrays t, x, y, p"
 TABLE = True
@@ -31,8 +32,7 @@ def matches(path: Path, head: bytes) -> bool:
 def read(path: Path, hints: Hints) -> Source:
     """The arrays, sensor and unit of time; RecordingError where they are missing or do not fit."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            names = tuple(n.removesuffix(".npy") for n in archive.namelist() if n.endswith(".npy"))
+        names = tuple(name.removesuffix(".npy") for name in members(path, ".npy"))
         return _npy.source(path, names, partial(_opened, path), _size(path, names), hints)
     except _npy.FAULTS as error:
         raise RecordingError(f"{path} is a damaged numpy archive: {error}") from error

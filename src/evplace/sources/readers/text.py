@@ -27,6 +27,7 @@ from evplace.sources.readers._order import Order
 from evplace.sources.readers._source import Block, Hints, Source, ordered, printable
 from evplace.sources.readers._text_numbers import parse
 from evplace.sources.readers._text_stream import HEAD, is_text, opened
+from evplace.sources.readers._zip import members
 
 ABOUT = "text, one event a line (.txt, .csv, also in .zip or .gz)"
 TABLE = True
@@ -88,10 +89,10 @@ def matches(path: Path, head: bytes) -> bool:
 def read(path: Path, hints: Hints) -> Source:
     """Columns, sensor and unit; RecordingError where the columns or the unit of time are not clear."""
     try:
-        members = _members(path)
-        streams = [name for name in members if name is not None and _is_table(path, name)]
+        held = _members(path)
+        streams = [name for name in held if name is not None and _is_table(path, name)]
         streams = ordered(path, streams, hints.stream) if streams else []
-        layout = _layout(path, streams[0] if streams else members[0] if members else None, hints)
+        layout = _layout(path, streams[0] if streams else held[0] if held else None, hints)
     except FAULTS as error:
         raise RecordingError(f"{path} cannot be unpacked: {error}") from error
     if layout is None:
@@ -106,11 +107,7 @@ def _members(path: Path) -> list[str | None]:
     with path.open("rb") as file:
         if file.read(2) != b"PK":
             return [None]
-    with zipfile.ZipFile(path) as archive:
-        if any(info.flag_bits & 1 for info in archive.infolist()):
-            raise UnsupportedError(f"{path} is an archive with a password: unpack it first")
-        names = [name for name in archive.namelist() if name.lower().endswith((".txt", ".csv"))]
-    return [*sorted(names, key=lambda name: ("event" not in name, name))]
+    return [*sorted(members(path, ".txt", ".csv"), key=lambda name: ("event" not in name, name))]
 
 
 def _is_table(path: Path, member: str | None) -> bool:
