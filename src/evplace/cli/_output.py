@@ -18,9 +18,10 @@ USED_GOOD_PART = 3
 
 
 def in_flags(text: str) -> str:
-    """What the library says of its arguments, such as `time_unit=us`, as a command line has it."""
+    """What the library says, on one line, and its arguments (`time_unit=us`) as a command line has them."""
+    shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
     return re.sub(
-        r"\b(size|time_unit|stream|columns)=", lambda found: f"--{found[1].replace('_', '-')} ", text
+        r"\b(size|time_unit|stream|columns)=", lambda found: f"--{found[1].replace('_', '-')} ", shown
     )
 
 

@@ -171,9 +171,7 @@ def test_an_encoding_that_is_not_read_further_on(tmp_path: Path, capsys: Capture
     packets[10:] = [message.replace(b"evt3", b"evt9") for message in packets[10:]]
     path = ros1_bag(tmp_path, KIND, packets)
     recording = open_recording(path)
-    with pytest.raises(
-        DamagedRecordingError, match="read up to here: messages of the encoding 'evt9' are not"
-    ):
+    with pytest.raises(DamagedRecordingError, match="read up to here: messages of the encoding 'evt9'"):
         list(recording.packets())
     assert recording.events == 2000
     assert main(["info", str(path)]) == 3

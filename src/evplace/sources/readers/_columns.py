@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import RecordingError
 from evplace.sources.readers import _order
-from evplace.sources.readers._source import Block, Hints
+from evplace.sources.readers._source import Block, Hints, printable
 
 US_PER_UNIT = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
 UNIT_WORDS = {
@@ -42,6 +42,7 @@ def time_unit(name: str, sample: NDArray[Any], hints: Hints) -> tuple[str, list[
     """
     if hints.time_unit is not None:
         return hints.time_unit, []
+    name = printable(name)
     stated = [UNIT_WORDS[word] for word in _order.words_of(name) if word in UNIT_WORDS]
     if len(stated) == 1:
         return stated[0], []

@@ -54,7 +54,7 @@ def _prophesee(head: bytes) -> str | None:
     version = evt_version(header(head).fields)
     if not version:
         return None
-    return f"a Prophesee raw file of EVT {printable(version)}: 2.0, 2.1 and 3.0 are read"
+    return f"a Prophesee raw file of EVT {version}: 2.0, 2.1 and 3.0 are read"
 
 
 def _packed(head: bytes) -> str | None:

@@ -12,6 +12,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from evplace.core.errors import DamagedRecordingError, RecordingError
 from evplace.core.events import Size
+from evplace.sources.readers._source import printable
 
 _LINE = re.compile(rb"%[^\n]*\n")
 _PLAIN = re.compile(rb"%[^\x00-\x08\x0e-\x1f\x7f\n]*\n")
@@ -40,7 +41,7 @@ def header(head: bytes) -> Header:
     for line in lines:
         words = line.decode("utf-8", "replace")[1:].split(maxsplit=1)
         if words:
-            fields[words[0].lower()] = words[1].strip() if len(words) > 1 else ""
+            fields[words[0].lower()] = printable(words[1].strip()) if len(words) > 1 else ""
     return Header(fields, position)
 
 

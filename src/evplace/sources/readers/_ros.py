@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.sources.readers._ros2_files import ZSTD
-from evplace.sources.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Encoding
+from evplace.sources.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Bytes, Encoding
 from evplace.sources.readers._source import Block, Hints, Source, gathered, joined, ordered, printable
 from evplace.sources.readers._unpack import UnpackError, unpack
 
@@ -38,10 +38,6 @@ FAULTS = (struct.error, ValueError, UnpackError)
 """What decoding a damaged message raises."""
 LITTLE_ENDIAN = b"\0\1"
 """How a message of plain CDR starts whose numbers stand low byte first."""
-
-
-Bytes = bytes | memoryview
-"""Views, where a message is a part of something larger: it is not copied before it is decoded."""
 
 
 class Message(NamedTuple):

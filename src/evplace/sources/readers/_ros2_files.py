@@ -16,6 +16,8 @@ from evplace.sources.readers._unpack import LIMIT
 
 ZSTD = b"\x28\xb5\x2f\xfd"
 """How data packed with zstd starts."""
+WINDOW = 1 << 27
+"""Bytes that unpacking looks back at most."""
 RATIO = 1000
 """How many bytes one of a packed file may become: those of events become four or five."""
 PART = 1 << 20
@@ -37,7 +39,7 @@ class BagFile:
         file = self.path.open("rb")
         if not self.packed:
             return file
-        unpacker = zstandard.ZstdDecompressor(max_window_size=LIMIT)
+        unpacker = zstandard.ZstdDecompressor(max_window_size=WINDOW)
         return unpacker.stream_reader(file, read_across_frames=True, closefd=True)
 
     def place(self) -> Path:

@@ -18,7 +18,9 @@ from evplace.sources.readers.evt3 import Decoder
 TIME_HIGH, TIME_LOW, ADDR_X, ADDR_Y, VECT_BASE_Y, VECT_8 = range(6)
 """The kinds of words of `libcaer_cmp`."""
 
-Encoding = Callable[[bytes | memoryview, int], Block]
+Bytes = bytes | bytearray | memoryview
+"""Views, where a message is a part of something larger: it is not copied before it is decoded."""
+Encoding = Callable[[Bytes, int], Block]
 """A packet's bytes and its time_base in ns -> events; remembers what the next packet needs."""
 SINCE_EPOCH = ("libcaer", "libcaer_cmp")
 """Encodings whose times count from 1970; the others count from the camera's own start."""
@@ -33,7 +35,7 @@ def evt3() -> Encoding:
 def mono() -> Encoding:
     """64 bits an event: 32 of time since time_base (ns), 16 of x, 15 of y, the polarity."""
 
-    def decode(data: bytes | memoryview, base_ns: int) -> Block:
+    def decode(data: Bytes, base_ns: int) -> Block:
         words = _words(data, "<u8")
         t_ns = (words & np.uint64(0xFFFFFFFF)).astype(np.int64) + _ns(base_ns)
         x, y = words >> np.uint64(32) & np.uint64(0xFFFF), words >> np.uint64(48) & np.uint64(0x7FFF)
@@ -45,7 +47,7 @@ def mono() -> Encoding:
 def libcaer() -> Encoding:
     """Two 32-bit words an event: polarity, y and x above a flag; then 31 bits of microseconds that wrap."""
 
-    def decode(data: bytes | memoryview, base_ns: int) -> Block:
+    def decode(data: Bytes, base_ns: int) -> Block:
         words = _words(data, "<u4")
         pixel, low = words[: len(words) // 2 * 2 : 2], words[1::2].astype(np.int64) & 0x7FFFFFFF
         wraps = np.cumsum(np.diff(low, prepend=low[:1]) < -(1 << 30), dtype=np.int64)
@@ -59,7 +61,7 @@ def libcaer() -> Encoding:
 def libcaer_cmp() -> Encoding:
     """16-bit words that change a state (time since time_base, column, row) and give events."""
 
-    def decode(data: bytes | memoryview, base_ns: int) -> Block:
+    def decode(data: Bytes, base_ns: int) -> Block:
         words = _words(data, "<u2")
         kinds = words >> 12
         room = int(np.count_nonzero(kinds == ADDR_Y) + 8 * np.count_nonzero(kinds == VECT_8))
@@ -118,7 +120,7 @@ ENCODINGS = {"evt3": evt3, "mono": mono, "libcaer": libcaer, "libcaer_cmp": libc
 """By the name in the message."""
 
 
-def _words(data: bytes | memoryview, kind: str) -> NDArray[np.unsignedinteger]:
+def _words(data: Bytes, kind: str) -> NDArray[np.unsignedinteger]:
     return np.frombuffer(data, kind, len(data) // np.dtype(kind).itemsize)
 
 

@@ -138,7 +138,7 @@ def _packets(path: Path, header: _Header, number: int) -> Iterator[Block]:
         )
 
 
-def _packet(data: bytes) -> Block:
+def _packet(data: bytes | bytearray) -> Block:
     """The events of one EventPacket; ValueError or struct.error where it is damaged."""
     root = 4 + struct.unpack_from("<I", data, 4)[0]
     offset = _field(data, root, 0, "<I", 0)
@@ -176,7 +176,7 @@ def _split(
         p[i] = rest >> np.uint64(32) & np.uint64(0xFF) != 0
 
 
-def _field_place(table: bytes, root: int, number: int) -> int:
+def _field_place(table: bytes | bytearray, root: int, number: int) -> int:
     """The byte where a FlatBuffer table keeps field `number`; 0 where it has none."""
     fields = root - struct.unpack_from("<i", table, root)[0]
     if fields < 0:
@@ -187,7 +187,7 @@ def _field_place(table: bytes, root: int, number: int) -> int:
     return root + offset if offset else 0
 
 
-def _field(table: bytes, root: int, number: int, kind: str, default: int) -> int:
+def _field(table: bytes | bytearray, root: int, number: int, kind: str, default: int) -> int:
     """The value of a FlatBuffer field, `default` where the table leaves it out."""
     place = _field_place(table, root, number)
     return int(struct.unpack_from(kind, table, place)[0]) if place else default

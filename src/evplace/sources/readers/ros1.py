@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 from evplace.core.errors import DamagedRecordingError
-from evplace.sources.readers._ros import Bag, Bytes, Message, source
+from evplace.sources.readers._ros import Bag, Message, source
+from evplace.sources.readers._ros_encodings import Bytes
 from evplace.sources.readers._source import Hints, Source, printable
 from evplace.sources.readers._unpack import LIMIT, UnpackError, unpack
 
@@ -92,7 +93,7 @@ def _record(file: BinaryIO, size: int) -> tuple[_Fields, bytes]:
     return _fields(parts[0]), parts[1]
 
 
-def _in_chunk(chunk: bytes, connections: _Connections) -> Iterator[Message]:
+def _in_chunk(chunk: Bytes, connections: _Connections) -> Iterator[Message]:
     """The messages of an unpacked chunk."""
     position, view = 0, memoryview(chunk)
     while position < len(chunk):

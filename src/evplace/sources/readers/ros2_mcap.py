@@ -17,8 +17,9 @@ from typing import BinaryIO
 import zstandard
 
 from evplace.core.errors import DamagedRecordingError
-from evplace.sources.readers._ros import Bag, Bytes, Message, source
+from evplace.sources.readers._ros import Bag, Message, source
 from evplace.sources.readers._ros2_files import BagFile, bag_files, is_bag
+from evplace.sources.readers._ros_encodings import Bytes
 from evplace.sources.readers._source import Hints, Source, printable
 from evplace.sources.readers._unpack import LIMIT, UnpackError, unpack
 
