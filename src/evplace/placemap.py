@@ -109,6 +109,8 @@ class PlaceMap:
         mask: MaskSource | None = None,
         drive: str | None = None,
         dataset: str | None = None,
+        stream: str | None = None,
+        columns: str | None = None,
         **settings: object,
     ) -> Traverse:
         """A later drive, its images made exactly as this map's; see `open_traverse` for what `path` may be.
@@ -118,7 +120,9 @@ class PlaceMap:
         """
         recipe = self.recipe
         if (Path(path) / TRAVERSE).exists():
-            made = open_traverse(path, track, None, time_unit, None, mask, drive, dataset, **settings)
+            made = open_traverse(
+                path, track, None, time_unit, None, mask, drive, dataset, stream, columns, **settings
+            )
             self.require_same(made)
             return made
         if recipe is not None and settings:
@@ -128,7 +132,9 @@ class PlaceMap:
                 "what is asked for",
                 "leave that out, or train the map so",
             )
-        return open_traverse(path, track, recipe, time_unit, None, mask, drive, dataset, **settings)
+        return open_traverse(
+            path, track, recipe, time_unit, None, mask, drive, dataset, stream, columns, **settings
+        )
 
     def require_same(self, query: Traverse) -> None:
         """PlaceMapError where a query's images were not made as this map's: they cannot be compared."""

@@ -22,8 +22,12 @@ USED_GOOD_PART = 3
 
 
 def in_flags(text: str) -> str:
-    """A text of the library with its arguments as flags: `time_unit` is --time-unit, `fps=30` is --fps 30."""
-    return ARGUMENT.sub(_flag, text)
+    """A text of the library on one line, its arguments as flags: `time_unit` is --time-unit.
+
+    What no terminal shows, such as codes in a file's names, is escaped.
+    """
+    shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
+    return ARGUMENT.sub(_flag, shown)
 
 
 def _flag(argument: re.Match[str]) -> str:

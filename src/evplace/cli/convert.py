@@ -12,30 +12,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
+from evplace.cli._recording import RecordingFlags
 from evplace.core.errors import DamagedRecordingError
 from evplace.drives.datasets.utm_folders import write_images
 from evplace.imaging.traverse import Traverse
-from evplace.sources.readers import open_recording
 from evplace.sources.writers import write_recording
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(RecordingFlags):
     """Flags of `evplace convert`."""
 
     source: tyro.conf.Positional[Path]
     """An event recording of any known format, or a traverse folder."""
     target: tyro.conf.Positional[Path]
     """The file to write: .npz, .h5, .aedat4 or .raw (EVT3); of a traverse, the folder of images."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -46,7 +41,7 @@ def run(args: Args) -> int:
     """Read, check and write."""
     if (args.source / "traverse.json").exists():
         return _write_images(args)
-    recording = open_recording(args.source, args.size, time_unit=args.time_unit)
+    recording = args.opened(args.source)
     fault = None
     try:
         write_recording(args.target, recording.packets(), recording.size, overwrite=args.overwrite)

@@ -17,11 +17,12 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, in_flags, note, print_json
+from evplace.cli._recording import RecordingFlags
 from evplace.cli._settings import a_part_of
 from evplace.cli._track import TrackFlags
 from evplace.doctor import STATES, Examination, Finding, as_json, check_drawing, draw, examine
@@ -33,17 +34,13 @@ WORDS = {"bad": "bad", "look": "to look at", "unknown": "unknown", "good": "good
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags):
+class Args(TrackFlags, RecordingFlags):
     """Flags of `evplace doctor`."""
 
     recording: tyro.conf.Positional[Path]
     """An event recording, a video, a folder of images, or a data set's folder."""
     dt: str = "1/30"
     """Length of a window in seconds, as a fraction or a decimal."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say or says it wrongly."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     fps: float | None = None
     """For a folder of images without timestamps.txt: images a second, 30 unless given."""
     drive: str | None = None
@@ -71,6 +68,8 @@ def run(args: Args) -> int:
         args.fps,
         args.drive,
         args.dataset,
+        args.stream,
+        args.columns,
     )
     found = replace(found, findings=tuple(map(_with_flags, found.findings)))
     if args.report is not None:
@@ -106,7 +105,7 @@ def _lines(found: Examination) -> list[str]:
 def _told(finding: Finding, width: int) -> list[str]:
     head = f"  {finding.state:<7}  {finding.name:<{width}}  "
     indent = " " * len(head)
-    lines = _wrapped(finding.sentence, head, indent)
+    lines = _wrapped(in_flags(finding.sentence), head, indent)
     if finding.advice:
         lines += _wrapped(f"-> {finding.advice}", indent, indent + "   ")
     return lines

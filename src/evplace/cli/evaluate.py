@@ -18,6 +18,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
+from evplace.cli._recording import RecordingFlags
 from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
 from evplace.cli._track import TrackFlags
 from evplace.core.errors import MissingExtraError, SettingsError
@@ -39,7 +40,7 @@ SHOWN = (
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags):
+class Args(TrackFlags, RecordingFlags):
     """Flags of `evplace evaluate`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (
@@ -75,10 +76,6 @@ class Args(TrackFlags):
     """The traverse that a network's map was learned from: lends the images of the sample matches."""
     scores: bool = False
     """Keep the score rows in the result."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -116,7 +113,10 @@ def run(args: Args) -> int:
 def _opened(args: Args, place_map: PlaceMap) -> Traverse:
     """The query, its images made as the map's were."""
     size: dict[str, Any] = {} if args.size is None else {"size": args.size}
-    return place_map.open(args.drive, args.opened_track(), args.time_unit, args.mask, **size)
+    return place_map.open(
+        args.drive, args.opened_track(), args.time_unit, args.mask, stream=args.stream, columns=args.columns,
+        **size,
+    )  # fmt: skip
 
 
 def _truth(args: Args, place_map: PlaceMap, query: Traverse) -> Truth | None:

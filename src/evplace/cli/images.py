@@ -22,6 +22,7 @@ import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
 from evplace.cli._recipe import recipe_settings
+from evplace.cli._recording import RecordingFlags
 from evplace.cli._settings import a_part_of
 from evplace.cli._track import TrackFlags
 from evplace.core.storage import check_new_file
@@ -36,17 +37,13 @@ from evplace.sources.cleaning import CleaningSettings
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags):
+class Args(TrackFlags, RecordingFlags):
     """Flags of `evplace images`."""
 
     source: tyro.conf.Positional[Path]
     """An event recording, a video, a folder of images, or a data set's folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The traverse folder to write."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     drive: str | None = None
     """For a data set: which drive."""
     dataset: Annotated[str | None, a_part_of("datasets")] = None
@@ -127,4 +124,7 @@ def _named(args: Args) -> dict[str, Any]:
 
 def _source(args: Args) -> Drive:
     fps = args.fps if "fps" in args.given else None
-    return open_source(args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps)
+    return open_source(
+        args.source, args.size, args.time_unit, args.drive, args.dataset, args.list, fps, args.stream,
+        args.columns,
+    )  # fmt: skip

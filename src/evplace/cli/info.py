@@ -10,32 +10,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
+from evplace.cli._recording import RecordingFlags
 from evplace.core.errors import DamagedRecordingError
-from evplace.sources.readers import open_recording
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(RecordingFlags):
     """Flags of `evplace info`."""
 
     recording: tyro.conf.Positional[Path]
     """An event recording of any known format."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say or says it wrongly."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     json: bool = False
     """Print one JSON object."""
 
 
 def run(args: Args) -> int:
     """Read the whole recording and say what is in it."""
-    recording = open_recording(args.recording, args.size, time_unit=args.time_unit)
+    recording = args.opened(args.recording)
     fault = None
     try:
         for _ in recording.packets():

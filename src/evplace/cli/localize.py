@@ -17,15 +17,16 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
+from evplace.cli._recording import RecordingFlags
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.core.errors import DamagedRecordingError
 from evplace.core.storage import new_file
-from evplace.drives.to_traverse import open_source_for, recorded_as
+from evplace.drives.to_traverse import Reading, open_source_for, recorded_as
 from evplace.imaging.traverse import MARK as TRAVERSE
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
@@ -38,7 +39,7 @@ COLUMNS = ("t_us", "place", "easting", "northing", "score", "state")
 
 
 @dataclass(frozen=True)
-class Args(SettingsFlags):
+class Args(SettingsFlags, RecordingFlags):
     """Flags of `evplace localize`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (Part.of("matchers", "matcher", preset="preset"),)
@@ -57,10 +58,6 @@ class Args(SettingsFlags):
     """Write a .csv file instead of standard output."""
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -77,8 +74,15 @@ class _Drive:
     def __iter__(self) -> Iterator[Match]:
         events = self._events()
         if events is None:
+            args, mask = self._args, self._where.mask
             query = self._where.map.open(
-                self._args.drive, None, self._args.time_unit, self._where.mask, **self._size()
+                args.drive,
+                None,
+                args.time_unit,
+                mask,
+                stream=args.stream,
+                columns=args.columns,
+                **self._size(),
             )
             self.fault = query.info.get("fault")
             yield from self._where.match_traverse(query)
@@ -96,7 +100,8 @@ class _Drive:
         recipe = self._where.map.recipe
         if (self._args.drive / TRAVERSE).exists() or recipe is None:
             return None
-        drive = open_source_for(self._args.drive, recipe, self._size(), self._args.time_unit, None, None)
+        reading = Reading(self._args.time_unit, self._args.stream, self._args.columns)
+        drive = open_source_for(self._args.drive, recipe, self._size(), reading)
         source = recorded_as(recipe.kind, drive)
         if isinstance(source, Film):
             return None

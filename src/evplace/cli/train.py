@@ -16,12 +16,13 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
 from evplace.cli._recipe import recipe_settings, spacing_given
+from evplace.cli._recording import RecordingFlags
 from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
 from evplace.cli._track import TrackFlags
 from evplace.core import families
@@ -41,7 +42,7 @@ from evplace.sources.cleaning import CleaningSettings
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags):
+class Args(TrackFlags, RecordingFlags):
     """Flags of `evplace train`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (*TrackFlags.PARTS, Part.of("scorers", "scorer", preset="preset"))
@@ -70,10 +71,6 @@ class Args(TrackFlags):
     spacing: Annotated[SpacingSettings, tyro.conf.arg(name="")] = field(default_factory=SpacingSettings)
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
-    size: tuple[int, int] | None = None
-    """Width and height of the sensor in pixels, where the file does not say."""
-    time_unit: Literal["s", "ms", "us", "ns"] | None = None
-    """Unit of the times, where the file does not say."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -86,14 +83,9 @@ def run(args: Args) -> int:
     check_new_folder(args.out, args.overwrite, MARK)  # said before the training, not after it
     scorer = _scorer(args)
     reference = open_traverse(
-        args.drive,
-        args.opened_track(),
-        None,
-        args.time_unit,
-        spacing_given(args),
-        args.mask,
-        **recipe_settings(args),
-    )
+        args.drive, args.opened_track(), None, args.time_unit, spacing_given(args), args.mask,
+        stream=args.stream, columns=args.columns, **recipe_settings(args),
+    )  # fmt: skip
     places = _places(args, reference)
     began = time.monotonic()
     with progress("training") as show:

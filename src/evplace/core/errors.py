@@ -6,7 +6,9 @@ EvplaceError
 ├── MissingExtraError        an optional dependency is needed: the text carries the pip line
 ├── InputError               what was given cannot be used
 │   ├── RecordingError       an event recording
+│   │   ├── UnsupportedError     an encoding, codec, stream type or version that is not read
 │   │   └── DamagedRecordingError   the good part was delivered, then the data broke off
+│   │       └── DoubtfulRecordingError   all was delivered, but it can hardly be a recording
 │   ├── TrackError           a GPS log or positions
 │   ├── DatasetError        a folder of a data set: of no known layout, or a part of it is missing
 │   ├── TraverseError        a traverse folder, or images and times that do not fit
@@ -53,8 +55,16 @@ class RecordingError(InputError):
     """An event recording cannot be read."""
 
 
+class UnsupportedError(RecordingError):
+    """A recording is whole, but of an encoding, codec, stream type or version that is not read."""
+
+
 class DamagedRecordingError(RecordingError):
     """A recording broke off: every complete packet before the fault was delivered."""
+
+
+class DoubtfulRecordingError(DamagedRecordingError):
+    """All was delivered, but most of it was left out, or no camera sends events at such a rate."""
 
 
 class TrackError(InputError):

@@ -38,6 +38,8 @@ def examine(
     fps: float | None = None,
     drive: str | None = None,
     dataset: str | None = None,
+    stream: str | None = None,
+    columns: str | None = None,
 ) -> Examination:
     """Examine an event recording, a video, a folder of images or a drive of a data set, and its track.
 
@@ -48,7 +50,7 @@ def examine(
     """
     windows = WindowSettings(dt)
     given = open_track(track) if isinstance(track, str | Path) else track
-    opened = open_source(path, size, time_unit, drive, dataset, fps=fps)
+    opened = open_source(path, size, time_unit, drive, dataset, fps=fps, stream=stream, columns=columns)
     positions, recording = _known(opened.track if given is None else given), opened.source
     if isinstance(recording, Film):
         return _film(recording, windows, positions)
@@ -95,7 +97,7 @@ def _events(subject: Subject) -> Iterator[Events]:
                 subject.see_events(events)
                 yield events
     except DamagedRecordingError as error:
-        subject.fault = str(error)
+        subject.fault, subject.cause = str(error), error.__cause__ or error
 
 
 def _frames(subject: Subject, film: Film) -> Iterator[tuple[int, Frame]]:

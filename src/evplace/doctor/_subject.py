@@ -75,6 +75,8 @@ class Subject:
     """Whether the times were recorded, not made up from a rate."""
     fault: str | None = None
     """What broke the recording off."""
+    cause: BaseException | None = None
+    """The error behind it."""
     parts: int = 0
     """Events, or frames, so far."""
     t_first_us: int = 0

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from evplace.core.errors import DoubtfulRecordingError, UnsupportedError
 from evplace.doctor._outcome import Finding, Outcome, State
-from evplace.doctor._subject import AtTheEnd
+from evplace.doctor._subject import AtTheEnd, Subject
 
 OF = ("events", "frames")
 
@@ -18,12 +19,12 @@ class Check(AtTheEnd):
         """Findings: reading; for a recording also remarks, the reasons for drops, clock."""
         recording = self._subject.recording
         if recording is None:
-            return Outcome([_read(self._subject.fault)])
+            return Outcome([_read(self._subject)])
         dropped = recording.dropped
         total = self._subject.parts + sum(dropped.values())
         return Outcome(
             [
-                _read(self._subject.fault),
+                _read(self._subject),
                 _remarks(recording.notes),
                 _dropped(
                     "events outside the sensor", dropped["out_of_range"], total,
@@ -45,9 +46,22 @@ class Check(AtTheEnd):
         )  # fmt: skip
 
 
-def _read(fault: str | None) -> Finding:
+def _read(subject: Subject) -> Finding:
+    fault = subject.fault
     if fault is None:
         return Finding("reading", "good", None, "", "It was read to its end.")
+    if isinstance(subject.cause, DoubtfulRecordingError):
+        return Finding(
+            "reading", "bad", None, "",
+            f"It was read to its end, but it can hardly be a recording: {fault}.",
+            "do as it says, and use no result of it before",
+        )  # fmt: skip
+    if isinstance(subject.cause, UnsupportedError):
+        return Finding(
+            "reading", "bad", None, "",
+            f"What comes then is whole, but not read: {fault}. The part before it was examined.",
+            "record it in one encoding that is read, or convert it with the program that wrote it",
+        )  # fmt: skip
     return Finding(
         "reading", "bad", None, "",
         f"It breaks off: {fault}. Its good part was examined.",
@@ -61,7 +75,7 @@ def _remarks(notes: list[str]) -> Finding:
     return Finding(
         "remarks", "look", len(notes), "",
         f"The reader remarks: {'; '.join(notes)}.",
-        "where that is wrong, give `size` or `time_unit`",
+        "where that is wrong, give `size`, `time_unit`, `stream` or `columns`",
     )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ import dataclasses
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from evplace.core.errors import (
     SettingsError,
     TrackError,
     TraverseError,
+    UnsupportedError,
 )
 from evplace.core.events import Size
 from evplace.core.settings import make, to_dict
@@ -37,6 +38,16 @@ from evplace.sources.tracks import Track, open_track
 T = TypeVar("T")
 
 
+class Reading(NamedTuple):
+    """What is known of a source that does not say it: see `open_source`."""
+
+    time_unit: str | None = None
+    stream: str | None = None
+    columns: str | None = None
+    drive: str | None = None
+    dataset: str | None = None
+
+
 def open_traverse(
     path: str | Path,
     track: str | Path | Track | None = None,
@@ -46,6 +57,8 @@ def open_traverse(
     mask: MaskSource | None = None,
     drive: str | None = None,
     dataset: str | None = None,
+    stream: str | None = None,
+    columns: str | None = None,
     **settings: object,
 ) -> Traverse:
     """A traverse folder, an event recording, a video, a folder of images or a data set, as `path` is.
@@ -57,15 +70,19 @@ def open_traverse(
     brings its own track, mask and recipe, unless others are given.
 
     Recordings and images are turned into images in memory; for long ones, write a traverse folder with
-    `evplace images` first. `track` is a GPS log, or a Track; `time_unit` is for recordings that do not say
-    (see `open_recording`). `mask` names pixels of the recording to leave out (see
+    `evplace images` first. `track` is a GPS log, or a Track; `time_unit`, `stream` and `columns` are for
+    recordings that do not say (see `open_recording`). `mask` names pixels to leave out (see
     `evplace.sources.cleaning.read_mask`), besides what the recipe says. InputError where something cannot be
     read, or where a traverse folder was made otherwise than is asked for.
     """
     if (Path(path) / MARK).exists():
-        asked = {"time_unit": time_unit, "spacing": spacing, "mask": mask, "drive": drive, "dataset": dataset}
+        asked = {
+            "time_unit": time_unit, "spacing": spacing, "mask": mask, "drive": drive, "dataset": dataset,
+            "stream": stream, "columns": columns,
+        }  # fmt: skip
         return _opened_again(Path(path), _opened(track), recipe, settings, asked)
-    source = open_source_for(path, recipe, settings, time_unit, drive, dataset)
+    reading = Reading(time_unit, stream, columns, drive, dataset)
+    source = open_source_for(path, recipe, settings, reading)
     with tempfile.TemporaryDirectory(prefix="evplace-") as folder:
         writer = TraverseWriter(Path(folder), {})
         try:
@@ -85,15 +102,19 @@ def open_source(
     dataset: str | None = None,
     listing: str | Path | None = None,
     fps: float | None = None,
+    stream: str | None = None,
+    columns: str | None = None,
 ) -> Drive:
     """What `path` holds, as a drive: see `open_traverse`; `listing` and `fps` as in `open_frames`.
 
-    A folder is a data set where it has the layout of one, whatever else lies in it. `size` and `time_unit`
-    are for a recording, `drive` and `dataset` for a data set's folder, `listing` and `fps` for a folder of
-    images; SettingsError where one is given that has no meaning for what `path` is.
+    A folder is a data set where it has the layout of one, whatever else lies in it. `size`, `time_unit`,
+    `stream` and `columns` are for a recording, `drive` and `dataset` for a data set's folder, `listing` and
+    `fps` for a folder of images; SettingsError where one is given that has no meaning for what `path` is.
     """
     place = Path(path)
-    of_recordings: dict[str, object] = {"size": size, "time_unit": time_unit}
+    of_recordings: dict[str, object] = {
+        "size": size, "time_unit": time_unit, "stream": stream, "columns": columns,
+    }  # fmt: skip
     of_images: dict[str, object] = {"listing": listing, "fps": fps}
     is_folder = place.is_dir() and not is_recording(place)
     if drive is not None or dataset is not None or (is_folder and datasets.matching(place)):
@@ -107,7 +128,7 @@ def open_source(
             _refuse(f"{images} holds images, which have their own size", of_recordings)
             return Drive(_listed_film(images, listing, fps))
     _refuse(f"{place} is no folder of images", of_images)
-    return Drive(_recording(place, size, time_unit))
+    return Drive(_recording(place, size, time_unit, stream, columns))
 
 
 def record(
@@ -205,21 +226,17 @@ def _record_frames(
 
 
 def open_source_for(
-    path: str | Path,
-    recipe: Recipe | None,
-    settings: Mapping[str, Any],
-    time_unit: str | None,
-    drive: str | None,
-    dataset: str | None,
+    path: str | Path, recipe: Recipe | None, settings: Mapping[str, Any], reading: Reading
 ) -> Drive:
     """What `path` holds; a recording that does not state its sensor's size has that of the recipe."""
-    opened = open_source(path, settings.get("size"), time_unit, drive, dataset)
+    opened = open_source(path, settings.get("size"), **reading._asdict())
     source = opened.source
     if recipe is None or recipe.size is None or "size" in settings:
         return opened
     if not isinstance(source, Recording) or source.states_size:
         return opened
-    return dataclasses.replace(opened, source=_recording(source.path, recipe.size, time_unit))
+    again = _recording(source.path, recipe.size, reading.time_unit, reading.stream, reading.columns)
+    return dataclasses.replace(opened, source=again)
 
 
 def _opened_again(
@@ -301,11 +318,14 @@ def _listed_film(folder: Path, listing: str | Path | None, fps: float | None) ->
     return film_of(folder, frames)
 
 
-def _recording(place: Path, size: Size | None, time_unit: str | None) -> Recording:
+def _recording(
+    place: Path, size: Size | None, time_unit: str | None, stream: str | None, columns: str | None
+) -> Recording:
     try:
-        return open_recording(place, size, time_unit=time_unit)
+        return open_recording(place, size, time_unit=time_unit, stream=stream, columns=columns)
     except RecordingError as error:
-        if not place.is_file() or not place.stat().st_size or is_recording(place):
+        known = isinstance(error, UnsupportedError) or is_recording(place)
+        if not place.is_file() or not place.stat().st_size or known:
             raise
         raise RecordingError(f"{error}; videos are {', '.join(VIDEOS)}") from error
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
 import sqlite3
 import struct
 from collections.abc import Callable
@@ -11,7 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from evplace.core.errors import DamagedRecordingError
 from evplace.core.events import Events
+from evplace.sources.readers import Recording
 
 SIZE = (240, 180)
 
@@ -23,6 +27,15 @@ def some_events(count: int = 3000, span_us: int = 100_000, seed: int = 0) -> Eve
     return Events.of(
         t_us, rng.integers(0, 240, count), rng.integers(0, 180, count), rng.random(count) < 0.5, SIZE
     )
+
+
+def good_part(recording: Recording) -> Events:
+    """What was delivered before the recording broke off or proved doubtful."""
+    packets = []
+    with contextlib.suppress(DamagedRecordingError):
+        for packet in recording.packets():
+            packets.append(packet)
+    return Events.concatenate(packets)
 
 
 def _by_faery(name: str, **options: Any) -> Callable[[Path, Events], Path]:
@@ -50,15 +63,18 @@ def aedat2(folder: Path, events: Events) -> Path:
 
 
 def evt21(folder: Path, events: Events) -> Path:
+    path = folder / "made.raw"
+    path.write_bytes(b"% evt 2.1\n% geometry 240x180\n% end\n" + evt21_words(events).tobytes())
+    return path
+
+
+def evt21_words(events: Events) -> np.ndarray:
     """One word an event, and one with the high bits of the time before each."""
     t, x, y, p = (field.astype(np.uint64) for field in (events.t_us, events.x, events.y, events.p))
     high = np.uint64(8) << np.uint64(60) | t >> np.uint64(6) << np.uint64(32)
     event = p << np.uint64(60) | (t & np.uint64(63)) << np.uint64(54) | (x & ~np.uint64(31)) << np.uint64(43)
     event |= y << np.uint64(32) | np.uint64(1) << (x & np.uint64(31))
-    path = folder / "made.raw"
-    words = np.stack([high, event], 1).astype("<u8").tobytes()
-    path.write_bytes(b"% evt 2.1\n% geometry 240x180\n% end\n" + words)
-    return path
+    return np.stack([high, event], 1).astype("<u8").reshape(-1)
 
 
 def npz(folder: Path, events: Events) -> Path:
@@ -66,6 +82,13 @@ def npz(folder: Path, events: Events) -> Path:
     names = {"t_us": events.t_us, "x": events.x, "y": events.y, "p": events.p}
     np.savez_compressed(path, **names, width=events.size[0], height=events.size[1])
     return path
+
+
+def npy(folder: Path, events: Events) -> Path:
+    rows = np.zeros(len(events), [("x", "<u2"), ("y", "<u2"), ("t_us", "<i8"), ("p", "?")])
+    rows["t_us"], rows["x"], rows["y"], rows["p"] = events.t_us, events.x, events.y, events.p
+    np.save(folder / "made.npy", rows)
+    return folder / "made.npy"
 
 
 def hdf5(folder: Path, events: Events) -> Path:
@@ -102,15 +125,22 @@ def aedat3(folder: Path, events: Events) -> Path:
 
 
 def ros2_mcap(folder: Path, events: Events) -> Path:
+    return mcap_topics(folder, {"/events": packet_messages(events, aligned=True)})
+
+
+def mcap_topics(folder: Path, topics: dict[str, list[bytes]]) -> Path:
+    """Event packets of several topics, in turn."""
     writer: Any = pytest.importorskip("mcap.writer")
     path = folder / "made.mcap"
     with path.open("wb") as file:
         out = writer.Writer(file, chunk_size=4000, compression=writer.CompressionType.ZSTD)
         out.start("ros2", "test")
-        kind = "event_camera_msgs/msg/EventPacket"
-        channel = out.register_channel("/events", "cdr", out.register_schema(kind, "ros2msg", b""))
-        for message in packet_messages(events, aligned=True):
-            out.add_message(channel, log_time=0, publish_time=0, data=message)
+        schema = out.register_schema("event_camera_msgs/msg/EventPacket", "ros2msg", b"")
+        channels = [out.register_channel(topic, "cdr", schema) for topic in topics]
+        for turn in itertools.zip_longest(*topics.values()):
+            for channel, message in zip(channels, turn, strict=True):
+                if message is not None:
+                    out.add_message(channel, log_time=0, publish_time=0, data=message)
         out.finish()
     return path
 
@@ -167,30 +197,41 @@ def ros1(folder: Path, events: Events) -> Path:
 
 
 def ros1_bag(folder: Path, kind: str, messages: list[bytes]) -> Path:
+    return ros1_topics(folder, kind, {"/events": messages})
+
+
+def ros1_topics(folder: Path, kind: str, topics: dict[str, list[bytes]], index: bool = True) -> Path:
+    """A bag of several topics of one type, their messages in turn; without an index as if cut off."""
+
     def record(fields: dict[str, bytes], data: bytes) -> bytes:
         head = b"".join(
             struct.pack("<I", len(n) + 1 + len(v)) + n.encode() + b"=" + v for n, v in fields.items()
         )
         return struct.pack("<I", len(head)) + head + struct.pack("<I", len(data)) + data
 
-    connection = b"".join(
-        struct.pack("<I", len(text)) + text
-        for text in (b"topic=/events", b"type=" + kind.encode(), b"md5sum=*")
-    )
-    chunks = [record({"op": b"\7", "conn": b"\0\0\0\0", "topic": b"/events"}, connection)]
-    chunks += [record({"op": b"\2", "conn": b"\0\0\0\0", "time": b"\0" * 8}, message) for message in messages]
+    def connection(number: int, topic: str) -> bytes:
+        texts = (f"topic={topic}", f"type={kind}", "md5sum=*")
+        data = b"".join(struct.pack("<I", len(text)) + text.encode() for text in texts)
+        return record({"op": b"\7", "conn": struct.pack("<I", number), "topic": topic.encode()}, data)
+
+    used = [(number, topic) for number, topic in enumerate(topics) if topics[topic] or len(topics) == 1]
+    connections = [connection(number, topic) for number, topic in used]
+    chunks = list(connections)
+    for turn in itertools.zip_longest(*topics.values()):
+        for number, message in enumerate(turn):
+            if message is not None:
+                fields = {"op": b"\2", "conn": struct.pack("<I", number), "time": b"\0" * 8}
+                chunks.append(record(fields, message))
     body = b""
     for chunk in chunks:
         size = struct.pack("<I", len(chunk))
         body += record({"op": b"\5", "compression": b"none", "size": size}, chunk)
     start = b"#ROSBAG V2.0\n"
-    index = struct.pack("<Q", len(start) + 4096 + len(body))
-    top = record({"op": b"\3", "index_pos": index, "conn_count": b"\1\0\0\0"}, b"")
-    top = record({"op": b"\3", "index_pos": index, "conn_count": b"\1\0\0\0"}, b" " * (4096 - len(top)))
+    place = struct.pack("<Q", (len(start) + 4096 + len(body)) * index)
+    top = record({"op": b"\3", "index_pos": place, "conn_count": b"\1\0\0\0"}, b"")
+    top = record({"op": b"\3", "index_pos": place, "conn_count": b"\1\0\0\0"}, b" " * (4096 - len(top)))
     path = folder / "made.bag"
-    path.write_bytes(
-        start + top + body + record({"op": b"\7", "conn": b"\0\0\0\0", "topic": b"/e"}, connection)
-    )
+    path.write_bytes(start + top + body + b"".join(connections) * index)
     return path
 
 
@@ -199,16 +240,21 @@ def ros2_db3(folder: Path, events: Events) -> Path:
 
 
 def ros2_bag(folder: Path, kind: str, messages: list[bytes]) -> Path:
+    return ros2_topics(folder, kind, {"/events": messages})
+
+
+def ros2_topics(folder: Path, kind: str, topics: dict[str, list[bytes]]) -> Path:
+    """A bag of several topics of one type, their messages in turn."""
     path = folder / "made_0.db3"
     base = sqlite3.connect(path)
     base.execute("CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL)")
     base.execute(
         "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, data BLOB)"
     )
-    base.execute("INSERT INTO topics VALUES (1, '/events', ?)", (kind,))
-    base.executemany(
-        "INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 0, ?)", [(m,) for m in messages]
-    )
+    base.executemany("INSERT INTO topics(name, type) VALUES (?, ?)", [(topic, kind) for topic in topics])
+    for turn in itertools.zip_longest(*topics.values()):
+        rows = [(number, message) for number, message in enumerate(turn, 1) if message is not None]
+        base.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (?, 0, ?)", rows)
     base.commit()
     base.close()
     return path
@@ -224,6 +270,7 @@ MAKERS: dict[str, Callable[[Path, Events], Path]] = {
     "evt21": evt21,
     "evt3": _by_faery("made.raw", version="evt3"),
     "hdf5": hdf5,
+    "npy": npy,
     "npz": npz,
     "parquet": parquet,
     "ros1": ros1,

@@ -54,7 +54,7 @@ def test_m3ed(tmp_path: Path) -> None:
     path = written(tmp_path / "m.h5", **entries, **right, prophesee__left__calib__resolution=[1280, 720])
     recording = open_recording(path)
     assert recording.size == (1280, 720)
-    assert "there are more in prophesee/right" in recording.notes[0]
+    assert "there are also prophesee/right" in recording.notes[0]
     assert np.array_equal(read(path).t_us, SOME.t_us)
 
 
@@ -91,10 +91,10 @@ def test_prophesee(tmp_path: Path) -> None:
 
 
 def test_a_unit_that_is_not_clear_must_be_given(tmp_path: Path) -> None:
-    path = written(tmp_path / "b.h5", **rows(SOME.t_us * 1000, "brisbane"))
-    with pytest.raises(RecordingError, match="not clear"):
+    path = written(tmp_path / "b.h5", **rows(SOME.t_us * 10, "tenths"))
+    with pytest.raises(RecordingError, match=r"not clear.*time_unit=us"):
         open_recording(path)
-    assert np.array_equal(read(path, time_unit="ns").t_us, SOME.t_us)
+    assert np.array_equal(read(path, time_unit="us").t_us, SOME.t_us * 10)
 
 
 def test_files_that_do_not_fit(tmp_path: Path) -> None:

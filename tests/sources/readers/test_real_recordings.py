@@ -19,6 +19,7 @@ FACTS = [
     ("davis240c_translBoxes.aedat", "aedat2", (240, 180), 162_771, 2.07),
     ("evt3_packets_640x480.bag", "ros1", (640, 480), 343_474, 2.08),
     ("evt3_packets_640x480_ros2", "ros2_db3", (640, 480), 343_474, 2.08),
+    ("libcaer_cmp_346x260_ros2", "ros2_mcap", (346, 260), 571_266, 0.999),
     ("evt3_packets_640x480_ros2/test_events_1.db3", "ros2_db3", (640, 480), 343_474, 2.08),
 ]
 
@@ -36,6 +37,11 @@ def test_count_and_span(
         span_s, abs=6e-3 if span_s == 2.07 else 2e-3
     )
     assert sum(recording.dropped.values()) == 0
+
+
+def test_polarities_of_the_camera_of_inivation(data: Path) -> None:
+    packets = open_recording(data / "events" / "libcaer_cmp_346x260_ros2").packets()
+    assert sum(int(np.count_nonzero(packet.p)) for packet in packets) == 211_043
 
 
 def test_a_guessed_size_is_noted(data: Path) -> None:

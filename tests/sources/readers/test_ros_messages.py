@@ -8,11 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from made import ros1_bag, ros2_bag, some_events
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.core.events import Events
 from evplace.sources.readers import open_recording
+from evplace.sources.readers._ros_encodings import ENCODINGS
 
 DEFINITION = """std_msgs/Header header
 uint32 height
@@ -132,7 +135,65 @@ def test_the_encoding_libcaer_with_a_wrap_inside_a_packet(tmp_path: Path) -> Non
     assert np.array_equal(back.p, events.p)
 
 
+WORDS = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 0xFFF)), max_size=60)
+
+
+def plain_cmp(words: list[tuple[int, int]], base_us: int) -> list[tuple[int, int, int, bool]]:
+    """The plain twin of the decoder of `libcaer_cmp`: (t_us, x, y, p) of each event."""
+    state, events = {"high": 0, "low": 0, "x": 0, "y": 0, "p": 0}, []
+    for kind, value in words:
+        time = base_us + (state["high"] | state["low"])
+        if kind == 0:
+            state["high"] = value * 4096
+        elif kind == 1:
+            state["low"] = value
+        elif kind == 2:
+            state["x"] = value % 2048
+        elif kind == 3:
+            events.append((time, state["x"], value % 2048, value >= 2048))
+        elif kind == 4:
+            state["y"], state["p"] = value % 2048, value // 2048
+        else:
+            rows = np.flatnonzero(np.unpackbits(np.uint8(value % 256), bitorder="little"))
+            events += [(time, state["x"], state["y"] + int(row), state["p"] == 1) for row in rows]
+            state["y"] += 8
+    return events
+
+
+@given(WORDS, st.integers(0, 1 << 60))
+def test_the_encoding_libcaer_cmp_as_its_plain_twin(words: list[tuple[int, int]], base_ns: int) -> None:
+    data = np.array([kind << 12 | value for kind, value in words], "<u2").tobytes()
+    block = ENCODINGS["libcaer_cmp"]()(data, base_ns)
+    found = list(zip(block.t_us.tolist(), block.x.tolist(), block.y.tolist(), block.p.tolist(), strict=True))
+    assert found == plain_cmp(words, base_ns // 1000)
+
+
+def test_the_encoding_libcaer_cmp_in_packets_of_their_own_time(tmp_path: Path) -> None:
+    events = some_events(500, 900_000)
+    messages = []
+    for part in (events[:250], events[250:]):
+        words, base_us = [], int(part.t_us[0])
+        for t_us, x, y, p in zip(part.t_us - base_us, part.x, part.y, part.p, strict=True):
+            words += [t_us >> 12, 0x1000 | t_us & 0xFFF, 0x2000 | x, 0x3000 | p << 11 | y]
+        messages.append(
+            packet("libcaer_cmp", 5_000_000_000 + base_us * 1000, np.array(words, "<u2").tobytes())
+        )
+    back = read(ros1_bag(tmp_path, "event_camera_msgs/EventPacket", messages))
+    assert np.array_equal(back.t_us, events.t_us + 5_000_000)
+    for field in ("x", "y", "p"):
+        assert np.array_equal(getattr(back, field), getattr(events, field))
+
+
+def test_a_word_of_libcaer_cmp_that_is_not_known(tmp_path: Path) -> None:
+    good, bad = np.array([0x2001, 0x3001], "<u2").tobytes(), np.array([0x2001, 0x7000], "<u2").tobytes()
+    messages = [packet("libcaer_cmp", 0, data) for data in (good, bad)]
+    recording = open_recording(ros1_bag(tmp_path, "event_camera_msgs/EventPacket", messages))
+    with pytest.raises(DamagedRecordingError, match="word 1 is of the unknown kind 7"):
+        list(recording.packets())
+    assert recording.events == 1
+
+
 def test_an_unknown_encoding_is_an_error_that_names_the_known(tmp_path: Path) -> None:
     path = ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [packet("evt9", 0, b"\0" * 8)])
-    with pytest.raises(DamagedRecordingError, match=r"evt9.*known are evt3, mono, libcaer"):
-        read(path)
+    with pytest.raises(UnsupportedError, match=r"evt9.*known are evt3, mono, libcaer, libcaer_cmp"):
+        open_recording(path)

@@ -2,54 +2,86 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import RecordingError
-from evplace.sources.readers._source import Block, Hints
+from evplace.sources.readers import _order
+from evplace.sources.readers._source import Block, Hints, printable
 
 US_PER_UNIT = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
-NAMES = {
-    "t": ("t_us", "t_ns", "t_ms", "t_s", "t", "ts", "time", "times", "timestamp", "timestamps"),
-    "x": ("x", "xs", "x_coordinates"),
-    "y": ("y", "ys", "y_coordinates"),
-    "p": ("p", "ps", "pol", "polarity", "polarities", "on"),
-}
-"""Field -> the names under which files hold it, the clearest first."""
+UNIT_WORDS = {
+    "s": "s", "sec": "s", "secs": "s", "second": "s", "seconds": "s",
+    "ms": "ms", "msec": "ms", "millisecond": "ms", "milliseconds": "ms",
+    "us": "us", "usec": "us", "microsecond": "us", "microseconds": "us",
+    "ns": "ns", "nsec": "ns", "nanosecond": "ns", "nanoseconds": "ns",
+}  # fmt: skip
+"""Words in a name or an attribute -> the unit."""
+RATES = (1e3, 1e9)
+"""Events a second that a camera sends, from a still scene to more than any link carries."""
+SLOWEST = 2e4
+"""Events a second below which whole numbers might be milliseconds or nanoseconds as well."""
+SLOW = 100.0
+"""Events a second below which whole numbers cannot be microseconds, nor fractions of more than three places
+seconds: a camera's clock ticks in microseconds."""
+CENTURY_S = (946_684_800, 4_102_444_800)
+"""Seconds from 1970 to the years 2000 and 2100."""
 NOWHERE = 0xFFFF
 """A coordinate beyond any sensor: stands for numbers that a pixel cannot have."""
-
-
-def named(names: list[str]) -> dict[str, str] | None:
-    """Field -> its name among `names`, None where one of the four is missing."""
-    small = {name.lower(): name for name in names}
-    found = {field: next((small[n] for n in usual if n in small), None) for field, usual in NAMES.items()}
-    return {field: name for field, name in found.items() if name is not None} if all(found.values()) else None
 
 
 def time_unit(name: str, sample: NDArray[Any], hints: Hints) -> tuple[str, list[str]]:
     """The unit of time and the note on it, from the caller, the field's name, else the numbers.
 
-    Whole numbers are taken as microseconds and fractions as seconds, where the events then come at a rate
-    that only that unit makes likely. RecordingError where it could as well be another.
+    Times since 1970 have a unit each. Others are microseconds where they are whole, and seconds where they
+    have fractions, if the events then come at a rate that only that unit makes likely; nanoseconds where
+    microseconds would make next to none. RecordingError where it could as well be another.
     """
     if hints.time_unit is not None:
         return hints.time_unit, []
-    suffix = name.rpartition("_")[2]
-    if "_" in name and suffix in US_PER_UNIT:
-        return suffix, []
-    unit = "us" if np.issubdtype(sample.dtype, np.integer) else "s"
-    finite = sample[np.isfinite(sample)].astype(np.float64)
-    span_s = (finite[-1] - finite[0]) * US_PER_UNIT[unit] / 1e6 if len(finite) else 0.0
-    rate = len(sample) / span_s if span_s > 0 else 0.0
-    low, high = (2e4, 1e9) if unit == "us" else (10.0, 1e9)
-    if not low <= rate <= high:
+    name = printable(name)
+    stated = [UNIT_WORDS[word] for word in _order.words_of(name) if word in UNIT_WORDS]
+    if len(stated) == 1:
+        return stated[0], []
+    unit, rate, slowest = _likely(sample[np.isfinite(sample)].astype(np.float64))
+    if not slowest <= rate <= RATES[1]:
         raise RecordingError(
-            f"the unit of '{name}' is not clear: as {unit} it makes {rate:.3g} events/s: give the time unit"
+            f"the unit of '{name}' is not clear: as {unit} it makes {rate:.3g} events/s: give `time_unit`, "
+            f"as in `time_unit=us`"
         )
     return unit, [f"times in '{name}' are taken as {unit}: that makes {rate:.3g} events/s"]
+
+
+def _likely(times: NDArray[np.float64]) -> tuple[str, float, float]:
+    """The likeliest unit, the events a second that it makes, and how many it must make not to be in doubt."""
+    if not len(times) or times[-1] <= times[0]:
+        return "us", 0.0, SLOWEST
+    way, whole = float(times[-1] - times[0]), bool(np.all(times == np.rint(times)))
+    rates = {unit: len(times) * 1e6 / (way * us) for unit, us in US_PER_UNIT.items()}
+    for unit, rate in rates.items():
+        if _since_1970(float(times[0]), unit) and RATES[0] <= rate <= RATES[1]:
+            return unit, rate, RATES[0]
+    if not whole:
+        coarse = bool(np.allclose(times * 1e3, np.rint(times * 1e3), rtol=0, atol=1e-6))
+        return "s", rates["s"], RATES[0] if coarse else SLOW
+    unit = "ns" if rates["us"] < SLOW and rates["ns"] >= SLOWEST else "us"
+    return unit, rates[unit], SLOWEST
+
+
+def _since_1970(time: float, unit: str) -> bool:
+    """Whether a time is one of this century, counted from 1970."""
+    return CENTURY_S[0] < time * US_PER_UNIT[unit] / 1e6 < CENTURY_S[1]
+
+
+def of_rows(rows: Mapping[str, NDArray[Any]], unit: str, part_ns: int = 1) -> Block:
+    """Events from rows t, x, y and p; with `part`, the time is whole seconds and parts of `part_ns` each."""
+    found = block(rows["t"], rows["x"], rows["y"], rows["p"], unit)
+    if "part" not in rows:
+        return found
+    return found._replace(t_us=found.t_us + rows["part"].astype(np.int64) * part_ns // 1000)
 
 
 def block(t: NDArray[Any], x: NDArray[Any], y: NDArray[Any], p: NDArray[Any], unit: str) -> Block:

@@ -38,9 +38,11 @@ def main() -> None:
     limit_work()
     try:
         reader = importlib.import_module(f"evplace.sources.readers.{job['reader']}")
-        size = None if job["size"] is None else (job["size"][0], job["size"][1])
-        source: Source = reader.open_here(Path(job["path"]), Hints(size, job["unit"]))
-        _send(pipe, b"H", {"size": source.size, "notes": source.notes})
+        hints = job["hints"]
+        size, columns = (None if hints[name] is None else tuple(hints[name]) for name in ("size", "columns"))
+        known = Hints(size, hints["time_unit"], hints["stream"], columns)
+        source: Source = reader.open_here(Path(job["path"]), known)
+        _send(pipe, b"H", {"size": source.size, "notes": source.notes, "streams": list(source.streams)})
         if not job["head"]:
             for block in source.blocks():
                 _send_block(pipe, block)

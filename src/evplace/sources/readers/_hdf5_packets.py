@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import DamagedRecordingError
+from evplace.sources.readers._hdf5_links import arrays_in
 from evplace.sources.readers._source import Block, gathered
 
 PLACE = "dvs/data"
+TIMES = "timestamp"
 SIZE = (346, 260)
 _HEADER = struct.Struct("<hhiiiiii")
 """Type, source, bytes an event, offset of the time, overflow of the time, capacity, number, valid ones."""
@@ -32,8 +34,16 @@ _FALL_US = 1_000_000
 
 def is_packets(file: h5py.File) -> bool:
     """Whether the file holds such packets."""
-    rows = file.get(PLACE)
-    return isinstance(rows, h5py.Dataset) and rows.ndim == 2 and rows.shape[1] == 3 and rows.dtype.kind == "O"
+    group, name = PLACE.split("/")
+    if not isinstance(file.get(group, getlink=True), h5py.HardLink) or not isinstance(
+        file[group], h5py.Group
+    ):
+        return False
+    held = arrays_in(file[group])
+    if not {name, TIMES} <= set(held):
+        return False
+    rows = held[name]
+    return bool(rows.ndim == 2 and rows.shape[1] == 3 and rows.dtype.kind == "O")
 
 
 def blocks(path: Path) -> Iterator[Block]:
@@ -62,7 +72,7 @@ def _blocks(path: Path) -> Iterator[Block]:
 def _packets(path: Path) -> Iterator[tuple[int, bytes, NDArray[np.uint8]]]:
     """The computer's time, header and data of each packet; rows that were never written are left out."""
     with h5py.File(path, "r") as file:
-        rows, times = file[PLACE], file["dvs/timestamp"]
+        rows, times = file[PLACE], file[PLACE].parent[TIMES]
         for start in range(0, len(rows), _ROWS):
             part = slice(start, start + _ROWS)
             for received_us, (_, header, data) in zip(times[part], rows[part], strict=True):

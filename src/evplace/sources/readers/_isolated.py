@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import IO, Any
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import DamagedRecordingError
+from evplace.core.events import Size
 from evplace.core.workers import start, unpacked
 from evplace.sources.readers import _decoder
 from evplace.sources.readers._source import Block, Hints, Source
@@ -34,8 +36,14 @@ def isolated(reader: str, path: Path, hints: Hints) -> Source:
     """What `evplace.sources.readers.<reader>.open_here(path, hints)` gives, decoded in a child process."""
     about = next(_Child(reader, path, hints, header_only=True).messages())
     assert isinstance(about, dict)
-    size = None if about["size"] is None else (int(about["size"][0]), int(about["size"][1]))
-    return Source(size, partial(_blocks, reader, path, hints), list(about["notes"]))
+    return Source(
+        _pair(about["size"]), partial(_blocks, reader, path, hints), about["notes"], streams=about["streams"]
+    )
+
+
+def _pair(size: list[int] | None) -> Size | None:
+    """A size as JSON holds it."""
+    return None if size is None else (size[0], size[1])
 
 
 def _blocks(reader: str, path: Path, hints: Hints) -> Iterator[Block]:
@@ -49,10 +57,10 @@ class _Child:
 
     def __init__(self, reader: str, path: Path, hints: Hints, header_only: bool) -> None:
         self._path = path
-        job = {"reader": reader, "path": str(path), "size": hints.size, "unit": hints.time_unit}
+        job = {"reader": reader, "path": str(path), "hints": asdict(hints), "head": header_only}
         self._process = start(
             _decoder.__name__,
-            job | {"head": header_only},
+            job,
             stderr=subprocess.DEVNULL,
             pipesize=PIPE if sys.platform == "linux" else -1,
         )

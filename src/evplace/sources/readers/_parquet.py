@@ -12,9 +12,9 @@ import pyarrow
 import pyarrow.parquet
 from numpy.typing import NDArray
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
-from evplace.sources.readers import _columns
-from evplace.sources.readers._source import Block, Hints, Source
+from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
+from evplace.sources.readers import _columns, _order
+from evplace.sources.readers._source import Block, Hints, Source, printable
 
 EVENTS = 1 << 18
 """Events read at a time."""
@@ -27,21 +27,34 @@ def open_here(path: Path, hints: Hints) -> Source:
     try:
         with pyarrow.parquet.ParquetFile(path) as file:
             names = list(file.schema_arrow.names)
-            columns = _columns.named(names)
-            if columns is None:
-                raise RecordingError(f"{path}: columns t, x, y and p are needed; it holds {', '.join(names)}")
-            stated = str(file.schema_arrow.field(columns["t"]).type)
-        unit, notes = _unit(path, columns, stated, hints)
+            order = _order_of(path, names, hints)
+            stated = file.schema_arrow.field(order.t).type
+        columns = {"t": names[order.t], "x": names[order.x], "y": names[order.y], "p": names[order.p]}
+        if order.part is not None:
+            columns["part"] = names[order.part]
+        unit, notes = _unit(path, columns, stated, hints) if order.part is None else ("s", [])
+    except pyarrow.ArrowNotImplementedError as error:
+        raise UnsupportedError(f"{path} is not read: {' '.join(str(error).split())}") from error
     except FAULTS as error:
         raise RecordingError(f"{path} is a damaged Parquet file: {' '.join(str(error).split())}") from error
-    return Source(None, partial(_blocks, path, columns, unit), notes)
+    return Source(None, partial(_blocks, path, columns, unit, order.part_ns), notes)
 
 
-def _unit(path: Path, columns: dict[str, str], stated: str, hints: Hints) -> tuple[str, list[str]]:
+def _order_of(path: Path, names: list[str], hints: Hints) -> _order.Order:
+    """The columns as the caller says, else by their names."""
+    if hints.columns is not None and len(hints.columns) == len(names):
+        return _order.said(hints.columns)
+    order = _order.complete(_order.named(names))
+    if order is None or hints.columns is not None:
+        held = printable(", ".join(names))
+        raise RecordingError(f"{path}: columns t, x, y and p are needed; it holds {held}")
+    return order
+
+
+def _unit(path: Path, columns: dict[str, str], stated: Any, hints: Hints) -> tuple[str, list[str]]:
     """The unit that a column of Parquet's own time type states, else what `_columns` makes of the numbers."""
-    for unit in ("ns", "us", "ms", "s"):
-        if hints.time_unit is None and stated.startswith((f"timestamp[{unit}", f"duration[{unit}")):
-            return unit, []
+    if hints.time_unit is None and (pyarrow.types.is_timestamp(stated) or pyarrow.types.is_duration(stated)):
+        return str(stated.unit), []
     sample = next(_slices(path, columns), {"t": np.empty(0, np.int64)})["t"]
     return _columns.time_unit(columns["t"], sample, hints) if len(sample) else ("us", [])
 
@@ -49,22 +62,27 @@ def _unit(path: Path, columns: dict[str, str], stated: str, hints: Hints) -> tup
 def _slices(path: Path, columns: dict[str, str]) -> Iterator[dict[str, NDArray[Any]]]:
     with pyarrow.parquet.ParquetFile(path) as file:
         for batch in file.iter_batches(EVENTS, columns=list(columns.values())):
-            yield {field: _numbers(batch.column(name)) for field, name in columns.items()}
+            yield {field: _numbers(batch.column(name), field == "t") for field, name in columns.items()}
 
 
-def _numbers(column: Any) -> NDArray[Any]:
-    """A column as numbers; TypeError where it holds none."""
+def _numbers(column: Any, time: bool) -> NDArray[Any]:
+    """A column as numbers, NaN where it has none; TypeError where it holds something else."""
+    kind = column.type
+    if time and (pyarrow.types.is_timestamp(kind) or pyarrow.types.is_duration(kind)):
+        column = column.cast(pyarrow.int64())
     values: NDArray[Any] = column.to_numpy(zero_copy_only=False)
-    if values.dtype.kind in "mM":
-        return values.astype(np.int64)
+    if values.dtype.kind == "O" and pyarrow.types.is_boolean(kind):  # one without nulls is of numbers
+        values = column.cast(pyarrow.int8()).to_numpy(zero_copy_only=False)
     if values.dtype.kind not in "biuf":
-        raise TypeError("t, x, y and p must be numbers")
+        raise TypeError(f"t, x, y and p must be numbers, not {kind}")
     return values
 
 
-def _blocks(path: Path, columns: dict[str, str], unit: str) -> Iterator[Block]:
+def _blocks(path: Path, columns: dict[str, str], unit: str, part_ns: int) -> Iterator[Block]:
     try:
-        for part in _slices(path, columns):
-            yield _columns.block(part["t"], part["x"], part["y"], part["p"], unit)
+        for rows in _slices(path, columns):
+            yield _columns.of_rows(rows, unit, part_ns)
+    except pyarrow.ArrowNotImplementedError as error:
+        raise UnsupportedError(f"{path} is not read: {' '.join(str(error).split())}") from error
     except FAULTS as error:
         raise DamagedRecordingError(f"{path} breaks off: {' '.join(str(error).split())}") from error

@@ -12,8 +12,12 @@ from numpy.typing import DTypeLike, NDArray
 
 from evplace.core.errors import DamagedRecordingError, RecordingError
 from evplace.core.events import Size
+from evplace.sources.readers._source import printable
 
-_LINE = re.compile(rb"%[ \t]?[\x09\x20-\x7e]*\r?\n")
+_LINE = re.compile(rb"%[^\n]*\n")
+_PLAIN = re.compile(rb"%[^\x00-\x08\x0e-\x1f\x7f\n]*\n")
+"""A line that may be text of any encoding: data that starts like a header seldom goes on like one."""
+_END = re.compile(rb"%[ \t]*end[ \t]*\r?\n")
 
 
 class Header(NamedTuple):
@@ -26,31 +30,45 @@ class Header(NamedTuple):
 
 
 def header(head: bytes) -> Header:
-    """The header in the first bytes of a file: lines that start with a percent sign, up to `% end`."""
+    """The header in the first bytes of a file: lines that start with a percent sign, up to `% end`.
+
+    They hold any bytes; where the end is not marked, it is the first line that cannot be text.
+    """
+    lines, position = _lines(head, _LINE)
+    if not lines or _END.fullmatch(lines[-1]) is None:
+        lines, position = _lines(head, _PLAIN)
     fields: dict[str, str] = {}
-    position = 0
-    while (line := _LINE.match(head, position)) is not None:
-        position = line.end()
-        words = line.group().decode("ascii")[1:].split(maxsplit=1)
+    for line in lines:
+        words = line.decode("utf-8", "replace")[1:].split(maxsplit=1)
         if words:
-            fields[words[0].lower()] = words[1].strip() if len(words) > 1 else ""
-        if words == ["end"]:
-            break
+            fields[words[0].lower()] = printable(words[1].strip()) if len(words) > 1 else ""
     return Header(fields, position)
+
+
+def _lines(head: bytes, kind: re.Pattern[bytes]) -> tuple[list[bytes], int]:
+    """The lines of that kind up to `% end`, and the byte after them."""
+    lines: list[bytes] = []
+    position = 0
+    while (line := kind.match(head, position)) is not None:
+        position = line.end()
+        lines.append(line.group())
+        if _END.fullmatch(lines[-1]) is not None:
+            break
+    return lines, position
 
 
 def evt_version(fields: dict[str, str]) -> str:
     """The encoding that a raw header states, such as "2.0" or "3"; empty where it states none."""
     if "evt" in fields:
         return fields["evt"]
-    stated = re.match(r"EVT(\d+)", fields.get("format", ""))
+    stated = re.match(r"EVT([\d.]+)", fields.get("format", ""))
     return stated.group(1) if stated else ""
 
 
 def stated_size(fields: dict[str, str]) -> Size | None:
     """(width, height) from whichever of the usual lines there is."""
     pairs = (
-        re.search(r"width=(\d+).*height=(\d+)", fields.get("format", "")),
+        re.search(r"(?=.*\bwidth=(\d+)).*\bheight=(\d+)", fields.get("format", "")),
         re.search(r"(\d+)\s*x\s*(\d+)", fields.get("geometry", "")),
         re.search(r"^(\d+) (\d+)$", f"{fields.get('width', '')} {fields.get('height', '')}"),
     )
@@ -59,7 +77,7 @@ def stated_size(fields: dict[str, str]) -> Size | None:
         return None
     width, height = int(found.group(1)), int(found.group(2))
     if not (0 < width <= 1 << 16 and 0 < height <= 1 << 16):
-        raise RecordingError(f"the header states a sensor of {width}x{height} pixels: give the size")
+        raise RecordingError(f"the header states a sensor of {width}x{height} pixels: give the `size`")
     return width, height
 
 

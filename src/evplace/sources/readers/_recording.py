@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.errors import (
+    DamagedRecordingError,
+    DoubtfulRecordingError,
+    RecordingError,
+    UnsupportedError,
+)
 from evplace.core.events import Events, Size
 from evplace.sources.readers._checks import NOTHING_YET, REASONS, checked
 from evplace.sources.readers._source import Block, Source, joined
+from evplace.sources.readers._verdict import verdict
 
 PACKET = 1_000_000
 """Events in a packet at most."""
@@ -21,6 +26,8 @@ USUAL_SIZES = (
     (1280, 720),
 )  # fmt: skip
 """Sensors that are sold or were; the smallest that holds the data is taken where a file states no size."""
+NOWHERE = 0xFFFF
+"""Stands for a coordinate that is no number: it says nothing of the sensor."""
 SAMPLE = 4_000_000
 """Events from which a missing sensor size is inferred."""
 
@@ -42,12 +49,16 @@ class Recording:
     back_us: int
     """How far the furthest of the events dropped as backwards lay back."""
     notes: list[str]
-    """Guesses that were made, one plain sentence each."""
+    """Guesses and choices that were made, one plain sentence each."""
+    streams: list[str]
+    """The names of all streams of events in the file, the one that is read first; empty where a format has
+    but one, without a name."""
 
     def __init__(self, path: Path, format: str, source: Source, size: Size | None) -> None:
         self.path = path
         self.format = format
-        self.notes = list(source.notes)
+        self.streams = list(source.streams)
+        self.notes = _choice(self.streams) + list(source.notes)
         self._source = source
         self.size = self._decided_size(size)
         self._forget()
@@ -56,24 +67,35 @@ class Recording:
         """Events from the start, in packets of at most PACKET; the counts start anew as well.
 
         Times never decrease, within a packet and from one to the next. Raises DamagedRecordingError where
-        the recording breaks off, after all that came before it has been delivered.
+        the recording breaks off, after all that came before it has been delivered; DoubtfulRecordingError
+        after all, where it can hardly be a recording (see `_verdict`).
         """
         self._forget()
         held: Block | None = None
-        fault: DamagedRecordingError | None = None
+        fault: RecordingError | None = None
         try:
             for block in self._source.blocks():
                 good, held = self._kept(block if held is None else joined([held, block]), final=False)
                 yield from self._delivered(good)
-        except DamagedRecordingError as error:
+        except (DamagedRecordingError, UnsupportedError) as error:
             fault = error
         except OSError as error:
             fault = DamagedRecordingError(f"{self.path} cannot be read further: {error.strerror or error}")
         if held is not None:
             good, _ = self._kept(held, final=True)
             yield from self._delivered(good)
+        self._judge(fault)
+
+    def _judge(self, fault: RecordingError | None) -> None:
+        """Raise what ended the reading, else what speaks against it."""
+        if isinstance(fault, UnsupportedError) and self.events:
+            raise DamagedRecordingError(f"{self.path} is read up to here: {fault}") from fault
         if fault is not None:
             raise fault
+        span_us = (self.t_last_us or 0) - (self.t_first_us or 0)
+        doubt = verdict(self.events or 0, self.dropped, span_us, self.size)
+        if doubt is not None:
+            raise DoubtfulRecordingError(f"{self.path} (as {self.format}): {doubt}")
 
     @property
     def states_size(self) -> bool:
@@ -126,19 +148,30 @@ class Recording:
         return inferred
 
 
+def _choice(streams: list[str]) -> list[str]:
+    """What is read of several streams of events, and what is not."""
+    if len(streams) < 2:
+        return []
+    others = ", ".join(streams[1:])
+    return [f"events are read from {streams[0]}; there are also {others}: choose with `stream=NAME`"]
+
+
 def _smallest_holding(source: Source) -> Size:
     """The smallest usual sensor that holds all but one in 10,000 of the first events."""
     columns, rows, seen = np.zeros(1 << 16, np.int64), np.zeros(1 << 16, np.int64), 0
-    with contextlib.suppress(DamagedRecordingError):  # it is raised again when the packets are read
+    fault: RecordingError | None = None
+    try:
         for block in source.blocks():
             columns += np.bincount(block.x, minlength=1 << 16)
             rows += np.bincount(block.y, minlength=1 << 16)
             seen += len(block.t_us)
             if seen >= SAMPLE:
                 break
+    except (DamagedRecordingError, UnsupportedError) as error:
+        fault = error  # it is raised again when the packets are read
     if seen == 0:
-        raise RecordingError(
-            "the file states no sensor size and holds no event to infer it from: give the size"
+        raise fault or RecordingError(
+            "the file states no sensor size and holds no event to infer it from: give the `size`"
         )
     width, height = _extent(columns), _extent(rows)
     return next(((w, h) for w, h in USUAL_SIZES if w >= width and h >= height), (width, height))
@@ -146,6 +179,7 @@ def _smallest_holding(source: Source) -> Size:
 
 def _extent(counts: NDArray[np.int64]) -> int:
     """One more than the coordinate that all but one in 10,000 events reach at most."""
+    counts = counts[:NOWHERE]
     total = int(counts.sum())
     return int(np.searchsorted(np.cumsum(counts), total - total // 10_000)) + 1
 

@@ -1,11 +1,13 @@
 """Event messages of ROS 1 and ROS 2, whatever bag they stand in.
 
 Read are event_camera_msgs/EventPacket and dvs_msgs/EventArray (also under their older names). Serialisation:
-ROS 1 packs all fields; ROS 2 (CDR) aligns each to its own width and ends text with a zero byte.
+ROS 1 packs all fields; ROS 2 (CDR) aligns each to its own width and ends text with a zero byte. A message of
+ROS 2 may be packed with zstd.
 """
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,9 +17,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
-from evplace.sources.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Encoding
-from evplace.sources.readers._source import Block, Source, gathered, joined
+from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
+from evplace.sources.readers._ros2_files import ZSTD
+from evplace.sources.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Bytes, Encoding
+from evplace.sources.readers._source import Block, Hints, Source, gathered, joined, ordered, printable
+from evplace.sources.readers._unpack import UnpackError, unpack
 
 PACKETS = ("event_camera_msgs/EventPacket", "event_array_msgs/EventArray")
 ARRAYS = ("dvs_msgs/EventArray", "prophesee_event_msgs/EventArray")
@@ -29,10 +33,11 @@ ALIGNED = np.dtype(
 )  # fmt: skip
 """An event of an EventArray in ROS 2 that starts two bytes off a multiple of four; the next is STEP away."""
 STEP = 16
-
-
-Bytes = bytes | memoryview
-"""Views, where a message is a part of something larger: it is not copied before it is decoded."""
+MOVED = "times of a camera's own clock are moved: the first event has the stamp of its message"
+FAULTS = (struct.error, ValueError, UnpackError)
+"""What decoding a damaged message raises."""
+LITTLE_ENDIAN = b"\0\1"
+"""How a message of plain CDR starts whose numbers stand low byte first."""
 
 
 class Message(NamedTuple):
@@ -51,8 +56,10 @@ class Fields:
         self.data = data
         self.position = 4 if aligned else 0
         self._aligned = aligned
-        if aligned and data[1:2] != b"\x01":
-            raise ValueError("its numbers stand high byte first")
+        if aligned and data[:2] != LITTLE_ENDIAN:
+            raise UnsupportedError(
+                f"messages serialised as {bytes(data[:2]).hex()} are not read: 0001 is (CDR)"
+            )
 
     def take(self, kind: str) -> int:
         """One number of the struct type `kind`."""
@@ -81,48 +88,80 @@ class Fields:
         return seconds * 1_000_000_000 + nanoseconds
 
 
-def source(path: Path, messages: Callable[[], Iterator[Message]], aligned: bool) -> Source:
-    """The first topic with events in a bag; RecordingError where there is none that can be read."""
-    other: set[str] = set()
+class Bag(NamedTuple):
+    """A bag of any kind."""
+
+    path: Path
+    messages: Callable[[], Iterator[Message]]
+    """All messages in the order of the file; DamagedRecordingError where it breaks off."""
+    topics: dict[str, str]
+    """Topic -> type of its messages, as an index says it; empty where the bag has none."""
+    aligned: bool
+    """Whether it is of ROS 2."""
+
+
+def source(bag: Bag, hints: Hints) -> Source:
+    """The wanted topic with events, else the first; UnsupportedError in a bag without one."""
+    topics = bag.topics or _topics(bag)
+    found = [topic for topic, kind in topics.items() if kind in PACKETS + ARRAYS]
+    wanted = ordered(bag.path, found, hints.stream)[0] if hints.stream is not None and found else None
+    first = _first(bag, wanted)
+    others = [topic for topic in found if topic != first.topic]
+    return _opened(bag, first, [first.topic, *others])
+
+
+def _topics(bag: Bag) -> dict[str, str]:
+    """The topics of all messages up to where the bag breaks off."""
+    found: dict[str, str] = {}
+    with contextlib.suppress(DamagedRecordingError):
+        for message in bag.messages():
+            found[message.topic] = message.kind
+    return found
+
+
+def _first(bag: Bag, wanted: str | None) -> Message:
+    """The first message with events, of the wanted topic; the error says what there is instead."""
+    others: set[str] = set()
     try:
-        for message in messages():
-            if message.kind in PACKETS + ARRAYS:
-                return _opened(path, messages, message, aligned)
-            other.add(f"{message.topic} ({message.kind})")
+        for message in bag.messages():
+            if message.kind in PACKETS + ARRAYS and wanted in (None, message.topic):
+                return message
+            others.add(f"{message.topic} ({message.kind})")
     except DamagedRecordingError as error:
         raise RecordingError(f"{error}; no event came before") from error
-    found = ", ".join(sorted(other)) or "no message at all"
-    raise RecordingError(f"{path} holds no event messages ({', '.join(PACKETS + ARRAYS)}): it holds {found}")
+    held, known = ", ".join(sorted(others)) or "no message at all", ", ".join(PACKETS + ARRAYS)
+    raise UnsupportedError(f"{bag.path} holds no event messages ({known}): it holds {held}")
 
 
-def _opened(path: Path, messages: Callable[[], Iterator[Message]], first: Message, aligned: bool) -> Source:
+def _opened(bag: Bag, first: Message, streams: list[str]) -> Source:
+    decode = _Packets if first.kind in PACKETS else _Arrays
+    probe = decode(bag.aligned)
     try:
-        fields = Fields(first.data, aligned)
+        data = _plain(first.data, bag.aligned)
+        fields = Fields(data, bag.aligned)
         fields.header()
         height, width = fields.take("I"), fields.take("I")
-    except (struct.error, ValueError) as error:
-        raise RecordingError(f"{path}: the first event message is damaged: {error}") from error
+        probe(data)
+    except FAULTS as error:
+        raise RecordingError(f"{bag.path}: the first event message is damaged: {error}") from error
     size = (width, height) if 0 < width <= 1 << 16 and 0 < height <= 1 << 16 else None
-    notes = []
-    if first.kind in PACKETS:
-        notes.append("times of a camera's own clock are moved: the first event has the stamp of its message")
-
-    def blocks() -> Iterator[Block]:
-        decode = _Packets(aligned) if first.kind in PACKETS else _Arrays(aligned)
-        return gathered(_decoded(path, messages, first.topic, decode))
-
-    return Source(size, blocks, notes)
+    return Source(
+        size, lambda: gathered(_decoded(bag, first.topic, decode(bag.aligned))), probe.notes, streams=streams
+    )
 
 
-def _decoded(
-    path: Path, messages: Callable[[], Iterator[Message]], topic: str, decode: Callable[[Bytes], Block]
-) -> Iterator[Block]:
-    for number, message in enumerate(messages()):
+def _decoded(bag: Bag, topic: str, decode: Callable[[Bytes], Block]) -> Iterator[Block]:
+    for number, message in enumerate(bag.messages()):
         if message.topic == topic:
             try:
-                yield decode(message.data)
-            except (struct.error, ValueError) as error:
-                raise DamagedRecordingError(f"{path}: message {number} is damaged: {error}") from error
+                yield decode(_plain(message.data, bag.aligned))
+            except FAULTS as error:
+                raise DamagedRecordingError(f"{bag.path}: message {number} is damaged: {error}") from error
+
+
+def _plain(data: Bytes, aligned: bool) -> Bytes:
+    """A message as it was before it was packed; UnpackError where it is damaged."""
+    return unpack(bytes(data), "zstd") if aligned and data[:4] == ZSTD else data
 
 
 class _Packets:
@@ -132,6 +171,7 @@ class _Packets:
         self._aligned = aligned
         self._encodings: dict[str, Encoding] = {}
         self._shift_us: int | None = None
+        self.notes: list[str] = []
 
     def __call__(self, data: Bytes) -> Block:
         fields = Fields(data, self._aligned)
@@ -141,6 +181,7 @@ class _Packets:
         base_ns = fields.take("Q")
         name = bytes(fields.raw()).rstrip(b"\0").decode("ascii", "replace")
         fields.take("B")
+        self.notes = [] if name in SINCE_EPOCH else [MOVED]
         block = self._encoding(name)(fields.raw(), base_ns)
         if self._shift_us is None and len(block.t_us):
             self._shift_us = 0 if name in SINCE_EPOCH else stamp_ns // 1000 - int(block.t_us[0])
@@ -148,7 +189,10 @@ class _Packets:
 
     def _encoding(self, name: str) -> Encoding:
         if name not in ENCODINGS:
-            raise ValueError(f"its encoding '{name}' cannot be read: known are {', '.join(ENCODINGS)}")
+            known = ", ".join(ENCODINGS)
+            raise UnsupportedError(
+                f"messages of the encoding '{printable(name)}' are not read: known are {known}"
+            )
         if name not in self._encodings:
             self._encodings[name] = ENCODINGS[name]()
         return self._encodings[name]
@@ -159,6 +203,7 @@ class _Arrays:
 
     def __init__(self, aligned: bool) -> None:
         self._aligned = aligned
+        self.notes: list[str] = []
 
     def __call__(self, data: Bytes) -> Block:
         fields = Fields(data, self._aligned)

@@ -1,6 +1,7 @@
 """The encodings of event_camera_msgs/EventPacket: one function object each, from a packet's bytes to events.
 
-Layouts: the README of event_camera_msgs for `mono`, libcaer's polarity.h for `libcaer`, Prophesee for `evt3`.
+Layouts: the README of event_camera_msgs for `mono`, libcaer's polarity.h for `libcaer`, event_camera_codecs
+for `libcaer_cmp`, Prophesee for `evt3`.
 """
 
 from __future__ import annotations
@@ -8,14 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from evplace.sources.readers._source import Block
 from evplace.sources.readers.evt3 import Decoder
 
-Encoding = Callable[[bytes | memoryview, int], Block]
+TIME_HIGH, TIME_LOW, ADDR_X, ADDR_Y, VECT_BASE_Y, VECT_8 = range(6)
+"""The kinds of words of `libcaer_cmp`."""
+
+Bytes = bytes | bytearray | memoryview
+"""Views, where a message is a part of something larger: it is not copied before it is decoded."""
+Encoding = Callable[[Bytes, int], Block]
 """A packet's bytes and its time_base in ns -> events; remembers what the next packet needs."""
-SINCE_EPOCH = ("libcaer",)
+SINCE_EPOCH = ("libcaer", "libcaer_cmp")
 """Encodings whose times count from 1970; the others count from the camera's own start."""
 
 
@@ -28,7 +35,7 @@ def evt3() -> Encoding:
 def mono() -> Encoding:
     """64 bits an event: 32 of time since time_base (ns), 16 of x, 15 of y, the polarity."""
 
-    def decode(data: bytes | memoryview, base_ns: int) -> Block:
+    def decode(data: Bytes, base_ns: int) -> Block:
         words = _words(data, "<u8")
         t_ns = (words & np.uint64(0xFFFFFFFF)).astype(np.int64) + _ns(base_ns)
         x, y = words >> np.uint64(32) & np.uint64(0xFFFF), words >> np.uint64(48) & np.uint64(0x7FFF)
@@ -40,7 +47,7 @@ def mono() -> Encoding:
 def libcaer() -> Encoding:
     """Two 32-bit words an event: polarity, y and x above a flag; then 31 bits of microseconds that wrap."""
 
-    def decode(data: bytes | memoryview, base_ns: int) -> Block:
+    def decode(data: Bytes, base_ns: int) -> Block:
         words = _words(data, "<u4")
         pixel, low = words[: len(words) // 2 * 2 : 2], words[1::2].astype(np.int64) & 0x7FFFFFFF
         wraps = np.cumsum(np.diff(low, prepend=low[:1]) < -(1 << 30), dtype=np.int64)
@@ -51,11 +58,69 @@ def libcaer() -> Encoding:
     return decode
 
 
-ENCODINGS = {"evt3": evt3, "mono": mono, "libcaer": libcaer}
+def libcaer_cmp() -> Encoding:
+    """16-bit words that change a state (time since time_base, column, row) and give events."""
+
+    def decode(data: Bytes, base_ns: int) -> Block:
+        words = _words(data, "<u2")
+        kinds = words >> 12
+        room = int(np.count_nonzero(kinds == ADDR_Y) + 8 * np.count_nonzero(kinds == VECT_8))
+        t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
+        p = np.empty(room, np.bool_)
+        count, used = _decode_cmp(words, _ns(base_ns) // 1000, t_us, x, y, p)
+        if used < len(words):
+            raise ValueError(f"word {used} is of the unknown kind {kinds[used]}")
+        return Block(t_us[:count], x[:count], y[:count], p[:count])
+
+    return decode
+
+
+@njit(cache=True)
+def _decode_cmp(
+    words: NDArray[np.uint16],
+    base_us: int,
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.bool_],
+) -> tuple[int, int]:
+    """Fill the arrays; return the events, and the words up to one of unknown kind.
+
+    A word's kind stands in its upper 4 bits. Each packet starts with the time 0.
+    """
+    high, low, column, row = np.int64(0), np.int64(0), np.int64(0), np.int64(0)
+    polarity, count = False, 0
+    for i in range(len(words)):
+        kind, value = words[i] >> 12, np.int64(words[i] & 0xFFF)
+        if kind == ADDR_Y:  # one event
+            t_us[count], x[count], y[count] = base_us + (high | low), column, value & 0x7FF
+            p[count] = value & 0x800 != 0
+            count += 1
+        elif kind == ADDR_X:
+            column = value & 0x7FF
+        elif kind == TIME_LOW:
+            low = value
+        elif kind == TIME_HIGH:
+            high = value << 12
+        elif kind == VECT_BASE_Y:
+            row, polarity = value & 0x7FF, value & 0x800 != 0
+        elif kind == VECT_8:  # up to 8 neighbouring rows
+            for bit in range(8):
+                if value >> bit & 1:
+                    t_us[count], x[count], y[count] = base_us + (high | low), column, row + bit
+                    p[count] = polarity
+                    count += 1
+            row += 8
+        else:
+            return count, i
+    return count, len(words)
+
+
+ENCODINGS = {"evt3": evt3, "mono": mono, "libcaer": libcaer, "libcaer_cmp": libcaer_cmp}
 """By the name in the message."""
 
 
-def _words(data: bytes | memoryview, kind: str) -> NDArray[np.unsignedinteger]:
+def _words(data: Bytes, kind: str) -> NDArray[np.unsignedinteger]:
     return np.frombuffer(data, kind, len(data) // np.dtype(kind).itemsize)
 
 

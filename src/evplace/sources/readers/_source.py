@@ -1,14 +1,16 @@
-"""What a reader file gives and gets: see the docstring of this room."""
+"""What a reader file gives and gets: see the docstring of this package."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.errors import RecordingError
 from evplace.core.events import Size
 
 
@@ -20,6 +22,11 @@ class Hints:
     """(width, height) of the sensor; None: from the header, else from the data."""
     time_unit: str | None = None
     """"s", "ms", "us" or "ns"; None: from the file. Only formats without a unit of their own ask for it."""
+    stream: str | None = None
+    """Which of several streams of events is read; None: the first."""
+    columns: tuple[str, ...] | None = None
+    """What each column of a table is: t, x, y and p (for t also sec and nsec), other words for what is passed
+    over; None: from its names and values. Only formats of columns ask for it."""
 
 
 class Block(NamedTuple):
@@ -49,6 +56,40 @@ class Source:
     """Microseconds after which the file's clock starts anew, which `blocks` makes good; 0: it never does."""
     zero_us: int = 0
     """The time at which a clock that turns read 0."""
+    streams: Sequence[str] = ()
+    """The names of all streams of events in the file, the one that is read first; empty where a format has
+    but one, without a name."""
+
+
+def ordered(path: Path, streams: Sequence[str], wanted: str | None) -> list[str]:
+    """The names of the streams in a file, the wanted one first.
+
+    `wanted` is a name, or a part of one name only ("left"). RecordingError where there is no such one.
+    """
+    if wanted is None:
+        return list(streams)
+    found = [name for name in streams if name == wanted] or [name for name in streams if wanted in name]
+    if len(found) != 1 or not wanted:
+        raise RecordingError(f"{path} has no stream '{wanted}': it has {', '.join(streams)}")
+    return sorted(streams, key=lambda name: name != found[0])
+
+
+def numbered(path: Path, cameras: Mapping[int, str], wanted: str | None) -> tuple[int, list[str]]:
+    """The number of the stream to read, and the names of all, its own first.
+
+    `cameras` is number -> name of the camera. A stream goes by its camera, where that has no other, else by
+    its number; `wanted` may be either. RecordingError where there is no such one.
+    """
+    once = list(cameras.values())
+    names = {n: name if name and once.count(name) == 1 else str(n) for n, name in cameras.items()}
+    asked = next((name for n, name in names.items() if str(n) == wanted), wanted)
+    streams = ordered(path, list(names.values()), asked)
+    return next(n for n, name in names.items() if name == streams[0]), streams
+
+
+def printable(name: str) -> str:
+    """A name out of a file on one line, without the codes that move a terminal's cursor."""
+    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in name)
 
 
 def gathered(blocks: Iterator[Block], events: int = 1 << 15) -> Iterator[Block]:

@@ -6,7 +6,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-NEWLINE, RETURN, MINUS, PLUS, DOT, HASH = ord("\n"), ord("\r"), ord("-"), ord("+"), ord("."), ord("#")
+NEWLINE, RETURN, MINUS, PLUS, DOT = ord("\n"), ord("\r"), ord("-"), ord("+"), ord(".")
+HASH, PERCENT = ord("#"), ord("%")
+TRUE, FALSE, ON, OFF = (np.frombuffer(word, np.uint8) for word in (b"true", b"false", b"on", b"off"))
+"""Words for 1 and 0, in capitals or not."""
 DIGITS = 18
 """Digits that 64 bits hold; further ones are beyond any clock."""
 TENS = 10 ** np.arange(DIGITS + 1, dtype=np.int64)
@@ -19,7 +22,7 @@ def parse(
     """Up to `rows` rows of `columns` numbers; the text must end with a newline.
 
     Returns whole parts and billionths, (N, columns) each, the bytes used and the lines seen; it stops before
-    the first line that is neither empty, nor a remark (#), nor such a row.
+    the first line that is neither empty, nor a remark (# or %), nor such a row.
     """
     whole, fraction = np.empty((rows, columns), np.int64), np.empty((rows, columns), np.int64)
     count, i, lines = 0, 0, 0
@@ -95,7 +98,7 @@ def _row(
     while i < size and text[i] != NEWLINE:
         if _blank(text[i]):
             i += 1
-        elif text[i] == HASH and column == 0:
+        elif (text[i] == HASH or text[i] == PERCENT) and column == 0:
             while i < size and text[i] != NEWLINE:
                 i += 1
         elif column == columns:
@@ -111,14 +114,39 @@ def _row(
 
 @njit(cache=True)
 def _blank(byte: int) -> bool:
-    """Space, tab, carriage return, comma or semicolon."""
-    return byte == 32 or byte == 9 or byte == 13 or byte == 44 or byte == 59
+    """Space, tab, carriage return, comma, semicolon or a mark of quotation."""
+    separates = byte == 32 or byte == 9 or byte == 13 or byte == 44 or byte == 59
+    return separates or byte == 34 or byte == 39
+
+
+@njit(cache=True)
+def _spells(text: NDArray[np.uint8], start: int, word: NDArray[np.uint8]) -> bool:
+    """Whether a word stands at `start`, in capitals or not."""
+    end = start + len(word)
+    return bool(end <= len(text) and np.all(text[start:end] | 32 == word))
+
+
+@njit(cache=True)
+def _word(text: NDArray[np.uint8], start: int) -> tuple[int, int, int]:
+    """As `_number`, of a word that stands for 1 or 0."""
+    if _spells(text, start, TRUE):
+        return start + len(TRUE), 1, 0
+    if _spells(text, start, FALSE):
+        return start + len(FALSE), 0, 0
+    if _spells(text, start, ON):
+        return start + len(ON), 1, 0
+    if _spells(text, start, OFF):
+        return start + len(OFF), 0, 0
+    return start, 0, 0
 
 
 @njit(cache=True)
 def _number(text: NDArray[np.uint8], start: int) -> tuple[int, int, int]:
     """The end of the number at `start` (or `start` where there is none), its whole part and billionths."""
     i, size = start, len(text)
+    if text[i] > 57:
+        end, value, none = _word(text, i)
+        return end, value, none
     negative = text[i] == MINUS
     i += text[i] == MINUS or text[i] == PLUS
     digits, power, seen, after_dot = np.int64(0), 0, 0, False

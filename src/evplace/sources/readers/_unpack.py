@@ -4,24 +4,36 @@ from __future__ import annotations
 
 import bz2
 import io
+import re
 
 import lz4.frame
 import zstandard
 
-LIMIT = 1 << 28
+from evplace.core.errors import UnsupportedError
+from evplace.sources.readers._source import printable
+
+LIMIT = 1 << 26
 """Bytes that one packet may unpack to; those of real recordings are a few megabytes."""
+
+_NAME = re.compile(r"[A-Za-z][\w.+-]{0,15}")
 
 
 class UnpackError(Exception):
     """The packet cannot be unpacked; the text says why."""
 
 
-def unpack(data: bytes, method: str, limit: int = LIMIT) -> bytes:
-    """`data` unpacked by `method`: "none", "lz4", "zstd" or "bz2". Raises UnpackError."""
+def unpack(data: bytes, method: str, limit: int = LIMIT) -> bytes | bytearray:
+    """`data` unpacked by `method`: "none", "lz4", "zstd" or "bz2".
+
+    UnpackError where it is damaged, UnsupportedError for another method.
+    """
     if method == "none":
         return data
     if method not in _METHODS:
-        raise UnpackError(f"unknown compression '{method}'")
+        known = ", ".join(_METHODS)
+        if not _NAME.fullmatch(method):
+            raise UnpackError(f"'{printable(method[:20])}' is the name of no compression")
+        raise UnsupportedError(f"the compression '{method}' is not read: known are {known}")
     try:
         whole = _METHODS[method](data, limit)
     except (OSError, EOFError, RuntimeError, ValueError, zstandard.ZstdError) as error:
@@ -31,17 +43,18 @@ def unpack(data: bytes, method: str, limit: int = LIMIT) -> bytes:
     return whole
 
 
-def _lz4(data: bytes, limit: int) -> bytes:
+def _lz4(data: bytes, limit: int) -> bytes | bytearray:
     unpacker = lz4.frame.LZ4FrameDecompressor()
     step = max(4 * len(data), 1 << 16)
-    whole = [unpacker.decompress(data, step)]
-    size = len(whole[0])
-    while not unpacker.eof and not unpacker.needs_input and size <= limit:
-        whole.append(unpacker.decompress(b"", step))
-        size += len(whole[-1])
-    if not unpacker.eof and size <= limit:
+    first: bytes = unpacker.decompress(data, step)
+    if unpacker.eof:
+        return first
+    whole = bytearray(first)
+    while not unpacker.eof and not unpacker.needs_input and len(whole) <= limit:
+        whole += unpacker.decompress(b"", step)
+    if not unpacker.eof and len(whole) <= limit:
         raise EOFError("it ends too early")
-    return b"".join(whole)
+    return whole
 
 
 def _zstd(data: bytes, limit: int) -> bytes:

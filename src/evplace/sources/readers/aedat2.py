@@ -54,7 +54,7 @@ def read(path: Path, hints: Hints) -> Source:
         camera = {size: known for known, size in CAMERAS.items()}.get(hints.size or (0, 0))
         if camera is None:
             raise RecordingError(
-                f"{path} names no known camera ('{name}'): give the size of one of {CAMERAS}"
+                f"{path} names no known camera ('{name}'): give the `size` of one of {CAMERAS}"
             )
         notes.append(f"the header names no known camera: {camera} is taken for its size")
     size = CAMERAS[camera]

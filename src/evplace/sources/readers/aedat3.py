@@ -1,23 +1,26 @@
 """AEDAT 3.0 and 3.1 (cAER): packets of one kind of events each; those of change events are read.
 
+A camera is a source; it goes by its name in the header, or by its number.
 Layout: iniVation, "AEDAT 3.1 file format". A time is 31 bits of microseconds, with the number of times that
 they wrapped in the packet's header.
 """
 
 from __future__ import annotations
 
+import contextlib
 import re
 import struct
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
-from evplace.sources.readers._source import Block, Hints, Source, gathered
+from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
+from evplace.sources.readers._source import Block, Hints, Source, gathered, numbered
 from evplace.sources.readers._unpack import LIMIT
 from evplace.sources.readers.aedat2 import CAMERAS
 
@@ -36,7 +39,7 @@ def matches(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, hints: Hints) -> Source:
-    """The header; RecordingError where it does not end or the packets are packed in another way."""
+    """The header; RecordingError where it does not end, UnsupportedError where the packets are packed."""
     with path.open("rb") as file:
         head = file.read(1 << 20)
     end = head.find(END)
@@ -45,37 +48,62 @@ def read(path: Path, hints: Hints) -> Source:
     coding = re.search(rb"#Format: (\S+)", head[:end])
     if coding is not None and coding.group(1) != b"RAW":
         found = coding.group(1).decode("ascii", "replace")
-        raise RecordingError(f"{path} is packed as {found}: AEDAT 3 can be read as RAW only")
-    name = re.search(rb"#Source \d+: (\w+)", head[:end])
-    camera = name.group(1).decode("ascii").upper() if name else ""
-    size = next((CAMERAS[known] for known in CAMERAS if camera.startswith(known)), None)
-    return Source(size, partial(_blocks, path, end + len(END)))
+        raise UnsupportedError(f"{path} is packed as {found}: AEDAT 3 can be read as RAW only")
+    start = end + len(END)
+    known = {int(n): name.decode("ascii") for n, name in re.findall(rb"#Source (\d+): (\w+)", head[:end])}
+    number, streams = numbered(
+        path, {n: known.get(n, "") for n in _senders(path, start, known)}, hints.stream
+    )
+    camera = known.get(number, next(iter(known.values()), "")).upper()
+    size = next((CAMERAS[name] for name in CAMERAS if camera.startswith(name)), None)
+    return Source(size, partial(_blocks, path, start, number), streams=streams)
 
 
-def _blocks(path: Path, start: int) -> Iterator[Block]:
-    return gathered(_packets(path, start))
+def _senders(path: Path, start: int, known: dict[int, str]) -> list[int]:
+    """The numbers of the sources that send change events; where none does, those of the header."""
+    found: dict[int, None] = {}
+    with path.open("rb") as file, contextlib.suppress(DamagedRecordingError):
+        for packet in _packets(path, file, start):
+            found[packet.source] = None
+    return list(found or known or (0,))
 
 
-def _packets(path: Path, start: int) -> Iterator[Block]:
-    """The packets of the first source that sends change events."""
-    size, wanted = path.stat().st_size, None
+def _blocks(path: Path, start: int, number: int) -> Iterator[Block]:
+    return gathered(_of_source(path, start, number))
+
+
+def _of_source(path: Path, start: int, number: int) -> Iterator[Block]:
     with path.open("rb") as file:
-        file.seek(start)
-        while (position := file.tell()) < size:
-            head = file.read(PACKET.size)
-            if len(head) < PACKET.size:
-                raise DamagedRecordingError(f"{path} is cut off inside the packet at byte {position}")
-            kind, source, width, time_at, wraps, room, count, _ = PACKET.unpack(head)
-            length = width * room
-            if width < 1 or room < 0 or not 0 <= count <= room or length > min(LIMIT, size - file.tell()):
-                raise DamagedRecordingError(f"{path} breaks off inside the packet at byte {position}")
-            if kind != POLARITY or wanted not in (None, source):
-                file.seek(length, 1)
-                continue
+        for packet in _packets(path, file, start):
+            if packet.source == number:
+                yield _block(file.read(packet.length), packet.events, packet.wraps)
+
+
+class _Packet(NamedTuple):
+    source: int
+    length: int
+    """Bytes of its events, at which the file stands."""
+    events: int
+    wraps: int
+
+
+def _packets(path: Path, file: BinaryIO, start: int) -> Iterator[_Packet]:
+    """The packets of change events; DamagedRecordingError where the file breaks off."""
+    position, size = start, path.stat().st_size
+    while position < size:
+        file.seek(position)
+        head = file.read(PACKET.size)
+        if len(head) < PACKET.size:
+            raise DamagedRecordingError(f"{path} is cut off inside the packet at byte {position}")
+        kind, source, width, time_at, wraps, room, count, _ = PACKET.unpack(head)
+        length = width * room
+        if width < 1 or room < 0 or not 0 <= count <= room or length > min(LIMIT, size - file.tell()):
+            raise DamagedRecordingError(f"{path} breaks off inside the packet at byte {position}")
+        if kind == POLARITY:
             if width != 8 or time_at != 4 or wraps < 0:
                 raise DamagedRecordingError(f"{path}: the packet at byte {position} is no packet of events")
-            wanted = source
-            yield _block(file.read(length), count, wraps)
+            yield _Packet(source, length, count, wraps)
+        position += PACKET.size + length
 
 
 def _block(data: bytes, count: int, wraps: int) -> Block:

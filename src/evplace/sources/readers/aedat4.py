@@ -1,4 +1,6 @@
-"""AEDAT 4.0 (iniVation DV): compressed FlatBuffer packets of several streams; the first with events is read.
+"""AEDAT 4.0 (iniVation DV): compressed FlatBuffer packets of several streams.
+
+A stream of events goes by the name of its camera, or by its number.
 
 Layout: iniVation, "AEDAT 4.0 file format", and its FlatBuffer schemas IOHeader and EventPacket.
 """
@@ -16,9 +18,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.core.events import Size
-from evplace.sources.readers._source import Block, Hints, Source, gathered
+from evplace.sources.readers._source import Block, Hints, Source, gathered, numbered, printable
 from evplace.sources.readers._unpack import LIMIT, UnpackError, unpack
 
 ABOUT = "AEDAT 4.0 file of iniVation DV"
@@ -28,15 +30,18 @@ COMPRESSIONS = ("none", "lz4", "lz4", "zstd", "zstd")
 EVENT_BYTES = 16
 
 
-class _Header(NamedTuple):
-    stream: int
+class _Stream(NamedTuple):
     size: Size | None
+    camera: str
+
+
+class _Header(NamedTuple):
     compression: str
     start: int
     """First byte of the packets."""
     end: int | None
     """First byte after the packets, where the table of all packets stands; None where there is none."""
-    notes: list[str]
+    streams: dict[int, _Stream]
 
 
 def matches(path: Path, head: bytes) -> bool:
@@ -45,14 +50,16 @@ def matches(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, hints: Hints) -> Source:
-    """The file header; RecordingError where it is damaged or names no stream of events."""
+    """The file header; RecordingError where it is damaged, UnsupportedError without a stream of events."""
     try:
         header = _header(path)
     except (struct.error, ValueError, IndexError, KeyError, ElementTree.ParseError) as error:
         raise RecordingError(
             f"{path}: the AEDAT 4 header is damaged ({error}): no event can be read"
         ) from error
-    return Source(header.size, partial(_blocks, path, header), header.notes)
+    cameras = {number: stream.camera for number, stream in header.streams.items()}
+    number, streams = numbered(path, cameras, hints.stream)
+    return Source(header.streams[number].size, partial(_blocks, path, header, number), streams=streams)
 
 
 def _header(path: Path) -> _Header:
@@ -67,39 +74,47 @@ def _header(path: Path) -> _Header:
     compression = _field(table, root, 0, "<i", 0)
     end = _field(table, root, 1, "<q", -1)
     text_offset = _field(table, root, 2, "<I", 0)
-    if not 0 <= compression < len(COMPRESSIONS) or text_offset == 0:
-        raise ValueError(f"compression {compression}, or no description of streams")
+    if text_offset == 0:
+        raise ValueError("no description of streams")
     text_start = _field_place(table, root, 2) + text_offset
     text = table[text_start + 4 : text_start + 4 + struct.unpack_from("<I", table, text_start)[0]]
-    stream, size, notes = _event_stream(path, ElementTree.fromstring(text.rstrip(b"\0")))
-    return _Header(stream, size, COMPRESSIONS[compression], start, end if end > 0 else None, notes)
+    streams = _event_streams(path, ElementTree.fromstring(text.rstrip(b"\0")))
+    if not 0 <= compression < len(COMPRESSIONS):
+        raise UnsupportedError(f"{path} is packed by method {compression} of AEDAT 4, which is not read")
+    return _Header(COMPRESSIONS[compression], start, end if end > 0 else None, streams)
 
 
-def _event_stream(path: Path, description: ElementTree.Element) -> tuple[int, Size | None, list[str]]:
-    """Number and size of the first stream of events, and a note if there are more."""
-    streams = [
-        node
-        for node in description.iterfind("./node[@name='outInfo']/node")
-        if node.findtext("./attr[@key='typeIdentifier']") == "EVTS"
-    ]
-    if not streams:
-        raise RecordingError(f"{path} is an AEDAT 4 file without a stream of events")
-    first = streams[0]
-    width = first.findtext("./node[@name='info']/attr[@key='sizeX']")
-    height = first.findtext("./node[@name='info']/attr[@key='sizeY']")
+def _event_streams(path: Path, description: ElementTree.Element) -> dict[int, _Stream]:
+    """The streams of events by their numbers."""
+    nodes = description.findall("./node[@name='outInfo']/node")
+    kinds = [node.findtext("./attr[@key='typeIdentifier']") or "?" for node in nodes]
+    if "EVTS" not in kinds:
+        held = printable(", ".join(kinds)) or "nothing"
+        raise UnsupportedError(
+            f"{path} is an AEDAT 4 file without a stream of events (EVTS): it holds {held}"
+        )
+    return {
+        int(node.attrib["name"]): _stream(node)
+        for node, kind in zip(nodes, kinds, strict=True)
+        if kind == "EVTS"
+    }
+
+
+def _stream(node: ElementTree.Element) -> _Stream:
+    """Sensor and camera of a stream."""
+    width = node.findtext("./node[@name='info']/attr[@key='sizeX']")
+    height = node.findtext("./node[@name='info']/attr[@key='sizeY']")
     size = None if width is None or height is None else (int(width), int(height))
     if size is not None and not (0 < size[0] <= 1 << 15 and 0 < size[1] <= 1 << 15):
         raise ValueError(f"a sensor of {width}x{height} pixels")
-    count = len(streams)
-    notes = [f"{count} streams of events: number {first.attrib['name']} is read"] if count > 1 else []
-    return int(first.attrib["name"]), size, notes
+    return _Stream(size, printable(node.findtext("./node[@name='info']/attr[@key='source']") or ""))
 
 
-def _blocks(path: Path, header: _Header) -> Iterator[Block]:
-    return gathered(_packets(path, header))
+def _blocks(path: Path, header: _Header, number: int) -> Iterator[Block]:
+    return gathered(_packets(path, header, number))
 
 
-def _packets(path: Path, header: _Header) -> Iterator[Block]:
+def _packets(path: Path, header: _Header, number: int) -> Iterator[Block]:
     end = path.stat().st_size
     if header.end is not None and header.end < end:
         end = header.end
@@ -110,7 +125,7 @@ def _packets(path: Path, header: _Header) -> Iterator[Block]:
             stream, length = struct.unpack("<ii", prefix) if len(prefix) == 8 else (0, -1)
             if not 0 <= length <= end - position - 8:
                 raise DamagedRecordingError(f"{path} breaks off inside the packet at byte {position}")
-            if stream != header.stream:
+            if stream != number:
                 file.seek(length, 1)
                 continue
             try:
@@ -123,7 +138,7 @@ def _packets(path: Path, header: _Header) -> Iterator[Block]:
         )
 
 
-def _packet(data: bytes) -> Block:
+def _packet(data: bytes | bytearray) -> Block:
     """The events of one EventPacket; ValueError or struct.error where it is damaged."""
     root = 4 + struct.unpack_from("<I", data, 4)[0]
     offset = _field(data, root, 0, "<I", 0)
@@ -161,7 +176,7 @@ def _split(
         p[i] = rest >> np.uint64(32) & np.uint64(0xFF) != 0
 
 
-def _field_place(table: bytes, root: int, number: int) -> int:
+def _field_place(table: bytes | bytearray, root: int, number: int) -> int:
     """The byte where a FlatBuffer table keeps field `number`; 0 where it has none."""
     fields = root - struct.unpack_from("<i", table, root)[0]
     if fields < 0:
@@ -172,7 +187,7 @@ def _field_place(table: bytes, root: int, number: int) -> int:
     return root + offset if offset else 0
 
 
-def _field(table: bytes, root: int, number: int, kind: str, default: int) -> int:
+def _field(table: bytes | bytearray, root: int, number: int, kind: str, default: int) -> int:
     """The value of a FlatBuffer field, `default` where the table leaves it out."""
     place = _field_place(table, root, number)
     return int(struct.unpack_from(kind, table, place)[0]) if place else default

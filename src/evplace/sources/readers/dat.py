@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import RecordingError
+from evplace.core.errors import UnsupportedError
 from evplace.sources.readers._clock import clock, unwrap_32
 from evplace.sources.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
 from evplace.sources.readers._source import Block, Hints, Source
@@ -36,14 +36,14 @@ def matches(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, hints: Hints) -> Source:
-    """The header; RecordingError where the file holds no change events or states an unknown version."""
+    """The header; UnsupportedError where the file holds no change events or is of an unknown version."""
     head = head_of(path)
     fields, start = header(head)
     if not head[start : start + 1] or head[start] not in CHANGE_EVENTS:
-        raise RecordingError(f"{path} is a DAT file without change events: it may hold triggers only")
+        raise UnsupportedError(f"{path} is a DAT file without change events: it may hold triggers only")
     version = fields.get("version", "")
     if version not in ("", "1", "2"):
-        raise RecordingError(f"{path} is a DAT file of version '{version}': known are 1 and 2")
+        raise UnsupportedError(f"{path} is a DAT file of version '{version}': known are 1 and 2")
     notes = [] if version else ["the DAT header states no version: 2 is taken"]
     zero_us = start_us(fields)
     blocks = partial(_blocks, path, start + 2, version == "1", zero_us)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.sources.readers._prophesee import head_of
 from evplace.sources.readers._source import Block, Hints, Source
 
@@ -31,14 +31,14 @@ def matches(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, hints: Hints) -> Source:
-    """The header; RecordingError for a version or a kind of events that cannot be read."""
+    """The header; UnsupportedError for a version or a kind of events that is not read."""
     head = head_of(path, 20)
     if len(head) < 20:
         raise RecordingError(f"{path} is cut off inside its header: no event can be read")
     if head[12] != 2:
-        raise RecordingError(f"{path} is an Event Stream of version {head[12]}: version 2 can be read")
+        raise UnsupportedError(f"{path} is an Event Stream of version {head[12]}: version 2 can be read")
     if head[15] not in (DVS, ATIS):
-        raise RecordingError(
+        raise UnsupportedError(
             f"{path} is an Event Stream of kind {head[15]}: DVS (1) and ATIS (2) can be read"
         )
     width, height = int.from_bytes(head[16:18], "little"), int.from_bytes(head[18:20], "little")

@@ -1,11 +1,13 @@
 """Prophesee raw, EVT 2.1: 64-bit words, each up to 32 neighbouring events of one row, time and polarity.
 
-Layout: Prophesee, "EVT 2.1 format" (the little-endian one). The time is 34 bits of microseconds and wraps
-every 4.77 h.
+Layout: Prophesee, "EVT 2.1 format". The time is 34 bits of microseconds and wraps every 4.77 h. Words come in
+two orders: `endianness=little` in the header's format line means 64 bits low byte first, `legacy` that the
+upper half of each stands before the lower one.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -14,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.errors import UnsupportedError
 from evplace.sources.readers._clock import clock, unwrap
 from evplace.sources.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
 from evplace.sources.readers._source import Block, Hints, Source
@@ -21,6 +24,10 @@ from evplace.sources.readers._source import Block, Hints, Source
 ABOUT = "Prophesee raw file, EVT 2.1"
 WORDS = 1 << 17
 """Words decoded at a time; a word gives 32 events at most."""
+TIME_HIGH = 0x8
+"""The kind of word that sends the upper bits of the time."""
+STEP = 1 << 27
+"""Half of its range: how far it goes from one such word to the next at most, where the clock runs."""
 POSITION = np.zeros(37, np.int64)
 """2 ** n modulo 37 -> n: the powers of two up to 2 ** 31 all leave another rest."""
 POSITION[[(1 << n) % 37 for n in range(32)]] = range(32)
@@ -32,16 +39,45 @@ def matches(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, hints: Hints) -> Source:
-    """The header; RecordingError where it states an impossible size."""
+    """The header; RecordingError for an impossible size, UnsupportedError for an unknown order of words."""
     fields, start = header(head_of(path))
     zero_us = start_us(fields)
-    blocks = partial(_blocks, path, start, zero_us)
-    return Source(stated_size(fields), blocks, turn_us=1 << 34, zero_us=zero_us)
+    order, notes = _order(path, fields, start)
+    blocks = partial(_blocks, path, start, order == "legacy", zero_us)
+    return Source(stated_size(fields), blocks, notes, turn_us=1 << 34, zero_us=zero_us)
 
 
-def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:
+def _order(path: Path, fields: dict[str, str], start: int) -> tuple[str, list[str]]:
+    """The order of the words that the header states, else the one in which the clock runs, with a note."""
+    stated = re.search(r"endianness=(\w+)", fields.get("format", ""))
+    if stated is not None:
+        if stated.group(1) not in ("little", "legacy"):
+            raise UnsupportedError(
+                f"{path} has its words in the order '{stated.group(1)}': little and legacy are read"
+            )
+        return stated.group(1), []
+    run = np.frombuffer(head_of(path, start + 8 * WORDS)[start:], "<u1")
+    run = run[: len(run) // 8 * 8].view("<u8")
+    order = "legacy" if _steps(_swapped(run)) > _steps(run) else "little"
+    return order, [f"the header states no order of the words of EVT 2.1: in '{order}' order the clock runs"]
+
+
+def _steps(run: NDArray[np.uint64]) -> int:
+    """How many more of the words of time go on from the one before than go back, the first counted."""
+    times = (run[run >> np.uint64(60) == TIME_HIGH] >> np.uint64(32)).astype(np.int64) & 0xFFFFFFF
+    steps = np.diff(times) & 0xFFFFFFF
+    return int(np.count_nonzero(steps <= STEP) - np.count_nonzero(steps > STEP)) + (len(times) > 0)
+
+
+def _swapped(run: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """The words with their halves exchanged."""
+    return run >> np.uint64(32) | run << np.uint64(32)
+
+
+def _blocks(path: Path, start: int, legacy: bool, shift_us: int) -> Iterator[Block]:
     state, clock_state = np.zeros(3, np.int64), clock()
-    for run in words(path, start, "<u8", WORDS):
+    for stored in words(path, start, "<u8", WORDS):
+        run = _swapped(stored) if legacy else stored
         room = _events_in(run)
         t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
         p = np.empty(room, np.bool_)
@@ -91,7 +127,7 @@ def _decode(
                     count += 1
                 else:
                     untimed += 1
-        elif kind == 0x8:
+        elif kind == TIME_HIGH:
             value = word >> 32 & 0xFFFFFFF
             if not timed:
                 clock_state[0], timed = value, True

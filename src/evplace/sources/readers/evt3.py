@@ -28,7 +28,7 @@ MOST = 12
 
 def matches(path: Path, head: bytes) -> bool:
     """Whether the raw header names EVT 3."""
-    return evt_version(header(head).fields).startswith("3")
+    return evt_version(header(head).fields) in ("3", "3.0")
 
 
 def read(path: Path, hints: Hints) -> Source:

@@ -10,8 +10,9 @@ from pathlib import Path
 from evplace.sources.readers._isolated import isolated
 from evplace.sources.readers._source import Hints, Source
 
-ABOUT = "HDF5 file (DSEC, M3ED, NSAVP, Prophesee and like layouts)"
+ABOUT = "HDF5 file (DSEC, M3ED, NSAVP, Prophesee, MVSEC, v2e and like layouts)"
 MAGIC = b"\x89HDF\r\n\x1a\n"
+TABLE = True
 
 
 def matches(path: Path, head: bytes) -> bool:

@@ -14,6 +14,7 @@ from evplace.sources.readers._source import Hints, Source
 
 ABOUT = "Parquet file with columns t, x, y, p"
 MAGIC = b"PAR1"
+TABLE = True
 
 
 def matches(path: Path, head: bytes) -> bool:

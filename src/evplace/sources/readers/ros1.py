@@ -1,6 +1,7 @@
 """ROS 1 bags (format 2.0), read record by record from the start, so that a cut bag gives all before the cut.
 
-Layout: ROS wiki, "Bags/Format/2.0". The index at the end is not needed.
+Layout: ROS wiki, "Bags/Format/2.0". The index at the end says which topics there are; without it all messages
+are looked at.
 """
 
 from __future__ import annotations
@@ -12,14 +13,17 @@ from pathlib import Path
 from typing import BinaryIO
 
 from evplace.core.errors import DamagedRecordingError
-from evplace.sources.readers._ros import Bytes, Message, source
-from evplace.sources.readers._source import Hints, Source
+from evplace.sources.readers._ros import Bag, Message, source
+from evplace.sources.readers._ros_encodings import Bytes
+from evplace.sources.readers._source import Hints, Source, printable
 from evplace.sources.readers._unpack import LIMIT, UnpackError, unpack
 
 ABOUT = "ROS 1 bag with event messages"
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG, CHUNK, CONNECTION = 0x02, 0x03, 0x05, 0x07
 """Kinds of records that matter; the others are indexes."""
+FAULTS = (struct.error, ValueError, KeyError, IndexError, OverflowError, UnpackError)
+"""What reading a damaged bag raises."""
 
 _Fields = dict[bytes, bytes]
 _Connections = dict[bytes, tuple[str, str]]
@@ -31,8 +35,26 @@ def matches(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, hints: Hints) -> Source:
-    """The first topic with events; RecordingError where there is none."""
-    return source(path, partial(_messages, path), aligned=False)
+    """The wanted topic with events, else the first; UnsupportedError where there is none."""
+    return source(Bag(path, partial(_messages, path), _topics(path), aligned=False), hints)
+
+
+def _topics(path: Path) -> dict[str, str]:
+    """Topic -> type, from the index; empty where it is missing or damaged."""
+    connections: _Connections = {}
+    try:
+        with path.open("rb") as file:
+            size = path.stat().st_size
+            file.seek(len(MAGIC))
+            fields, _ = _record(file, size)
+            file.seek(struct.unpack("<Q", fields[b"index_pos"])[0])
+            while file.tell() < size:
+                fields, data = _record(file, size)
+                if fields[b"op"][0] == CONNECTION:
+                    list(_taken(CONNECTION, fields, data, connections))
+    except FAULTS:
+        return {}
+    return dict(connections.values())
 
 
 def _messages(path: Path) -> Iterator[Message]:
@@ -53,7 +75,7 @@ def _messages(path: Path) -> Iterator[Message]:
                     yield from _in_chunk(chunk, connections)
                 else:
                     yield from _taken(kind, fields, data, connections)
-    except (struct.error, ValueError, KeyError, IndexError, UnpackError) as error:
+    except FAULTS as error:
         raise DamagedRecordingError(f"{path} breaks off: {error}") from error
     if not 0 < index <= size:
         raise DamagedRecordingError(f"{path} was not closed or is cut off: its index is missing")
@@ -71,7 +93,7 @@ def _record(file: BinaryIO, size: int) -> tuple[_Fields, bytes]:
     return _fields(parts[0]), parts[1]
 
 
-def _in_chunk(chunk: bytes, connections: _Connections) -> Iterator[Message]:
+def _in_chunk(chunk: Bytes, connections: _Connections) -> Iterator[Message]:
     """The messages of an unpacked chunk."""
     position, view = 0, memoryview(chunk)
     while position < len(chunk):
@@ -91,8 +113,8 @@ def _taken(kind: int, fields: _Fields, data: Bytes, connections: _Connections) -
     if kind == CONNECTION:
         about = _fields(bytes(data))
         connections[fields[b"conn"]] = (
-            fields[b"topic"].decode("utf-8", "replace"),
-            about[b"type"].decode("ascii", "replace"),
+            printable(fields[b"topic"].decode("utf-8", "replace")),
+            printable(about[b"type"].decode("ascii", "replace")),
         )
     elif kind == MESSAGE:
         yield Message(*connections[fields[b"conn"]], data)

@@ -1,12 +1,12 @@
-"""ROS 2 bags in MCAP files: a folder with its metadata.yaml, or one .mcap file. Checksums are verified.
+"""ROS 2 bags in MCAP files: a folder with its metadata.yaml, or one .mcap file, plain or packed with zstd.
+Checksums are verified.
 
-Layout: the MCAP specification (mcap.dev). Records are read from the start; the index at the end is not
-needed, so that a cut file gives all before the cut.
+Layout: the MCAP specification (mcap.dev). Records are read from the start, so that a cut file gives all
+before the cut; the summary at the end says which topics there are, and without it all messages are looked at.
 """
 
 from __future__ import annotations
 
-import re
 import struct
 import zlib
 from collections.abc import Iterator
@@ -14,15 +14,23 @@ from functools import partial
 from pathlib import Path
 from typing import BinaryIO
 
+import zstandard
+
 from evplace.core.errors import DamagedRecordingError
-from evplace.sources.readers._ros import Bytes, Message, source
-from evplace.sources.readers._source import Hints, Source
+from evplace.sources.readers._ros import Bag, Message, source
+from evplace.sources.readers._ros2_files import BagFile, bag_files, is_bag
+from evplace.sources.readers._ros_encodings import Bytes
+from evplace.sources.readers._source import Hints, Source, printable
 from evplace.sources.readers._unpack import LIMIT, UnpackError, unpack
 
 ABOUT = "ROS 2 bag (MCAP) with event messages"
 MAGIC = b"\x89MCAP0\r\n"
-FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 0x02, 0x03, 0x04, 0x05, 0x06
+FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK, STATISTICS = 0x02, 0x03, 0x04, 0x05, 0x06, 0x0B
 """Kinds of records that matter; the others are indexes and attachments."""
+TAIL = struct.Struct("<BQQQI8s")
+"""The end of a file: the footer with the place of the summary, and MAGIC."""
+FAULTS = (struct.error, ValueError, KeyError, OverflowError, UnpackError, zstandard.ZstdError)
+"""What reading a damaged file raises."""
 
 
 class _Names:
@@ -37,27 +45,51 @@ class _Names:
 
 def matches(path: Path, head: bytes) -> bool:
     """Whether it is an MCAP file, or a folder that holds some."""
-    return head.startswith(MAGIC) or (path.is_dir() and bool(_files(path)))
+    return is_bag(path, head, ".mcap", MAGIC)
 
 
 def read(path: Path, hints: Hints) -> Source:
-    """The first topic with events; RecordingError where there is none."""
-    return source(path, partial(_messages, path), aligned=True)
+    """The wanted topic with events, else the first; UnsupportedError where there is none."""
+    files = bag_files(path, ".mcap")
+    return source(Bag(path, partial(_messages, files), _topics(files), aligned=True), hints)
 
 
-def _files(path: Path) -> list[Path]:
-    """The files of a bag in the order of the numbers that end their names."""
-    files = path.glob("*.mcap") if path.is_dir() else [path]
-    return sorted(files, key=lambda file: (int((re.findall(r"(\d+)$", file.stem) or ["0"])[0]), file.name))
+def _topics(files: list[BagFile]) -> dict[str, str]:
+    """Topic -> type of all that have messages, from the summaries; empty where one is missing or damaged."""
+    found: dict[str, str] = {}
+    try:
+        for file in files:
+            with file.path.open("rb") as opened:
+                found |= _summary(opened, file.most)
+    except (*FAULTS, OSError):
+        return {}
+    return found
 
 
-def _messages(path: Path) -> Iterator[Message]:
-    for file in _files(path):
+def _summary(file: BinaryIO, size: int) -> dict[str, str]:
+    file.seek(size - TAIL.size)
+    kind, _, start, _, _, magic = TAIL.unpack(file.read(TAIL.size))
+    if kind != FOOTER or magic != MAGIC or not 0 < start < size:
+        raise ValueError("it has no summary")
+    names, counts = _Names(), b""
+    file.seek(start)
+    while (kind := (head := struct.unpack("<BQ", file.read(9)))[0]) != FOOTER:
+        data = file.read(min(head[1], size))
+        if kind == STATISTICS:
+            counts = data[46:]
+        elif kind in (SCHEMA, CHANNEL):
+            list(_taken(kind, data, names))
+    used = {number for number, count in struct.iter_unpack("<HQ", counts[: len(counts) // 10 * 10]) if count}
+    return dict(channel for number, channel in names.channels.items() if number in used)
+
+
+def _messages(files: list[BagFile]) -> Iterator[Message]:
+    for file in files:
         try:
-            with file.open("rb") as opened:
-                yield from _in_file(opened, file.stat().st_size)
-        except (struct.error, ValueError, KeyError, UnpackError) as error:
-            raise DamagedRecordingError(f"{file} breaks off: {error}") from error
+            with file.stream() as opened:
+                yield from _in_file(opened, file.most)
+        except FAULTS as error:
+            raise DamagedRecordingError(f"{file.path} breaks off: {error}") from error
 
 
 def _in_file(file: BinaryIO, size: int) -> Iterator[Message]:
@@ -71,12 +103,18 @@ def _in_file(file: BinaryIO, size: int) -> Iterator[Message]:
         if kind == FOOTER:
             return
         if kind not in (SCHEMA, CHANNEL, MESSAGE, CHUNK):
-            file.seek(length, 1)
+            _pass_over(file, length)
             continue
         if length > LIMIT:
             raise ValueError(f"a record at byte {file.tell()} claims {length} bytes")
         data = file.read(length)
         yield from _in_chunk(data, names) if kind == CHUNK else _taken(kind, data, names)
+
+
+def _pass_over(file: BinaryIO, length: int) -> None:
+    """As `seek`, which what is being unpacked cannot."""
+    while length > 0 and (part := file.read(min(length, 1 << 20))):
+        length -= len(part)
 
 
 def _in_chunk(data: bytes, names: _Names) -> Iterator[Message]:
@@ -111,4 +149,5 @@ def _taken(kind: int, data: Bytes, names: _Names) -> Iterator[Message]:
 def _text(data: Bytes, position: int) -> tuple[str, int]:
     """A counted text and the byte after it."""
     length = struct.unpack_from("<I", data, position)[0]
-    return bytes(data[position + 4 : position + 4 + length]).decode("utf-8", "replace"), position + 4 + length
+    text = bytes(data[position + 4 : position + 4 + length]).decode("utf-8", "replace")
+    return printable(text), position + 4 + length

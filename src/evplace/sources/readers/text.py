@@ -1,39 +1,40 @@
-"""Text with one event a line, also inside .zip or .gz: `t x y p` (as in rpg's data sets), `x y p t`
-or `x y t p`, told by which numbers rise and which are signs.
+"""Text with one event a line, also inside .zip or .gz: `t x y p` (as in rpg's data sets), `x y p t` or any
+other order that a line of names, the values or the caller tells (see `_order`).
 
-Numbers are separated by blanks, tabs, commas or semicolons. A first line of two numbers is the sensor's
-width and height; a line of names says which column is which, and may give the unit of time (`t_us`). Lines
-that start with # are passed over.
+Numbers are separated by blanks, tabs, commas or semicolons, and may stand in quotes; a polarity may be a
+word. A first line of two numbers is the sensor's width and height; remarks (`#`, `%`) and names (`x@320`) may
+state it too. A name may give the unit of time (`t_us`).
 """
 
 from __future__ import annotations
 
-import gzip
 import re
 import zipfile
 import zlib
 from collections.abc import Generator, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from functools import partial
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.core.events import Size
-from evplace.sources.readers import _columns
-from evplace.sources.readers._source import Block, Hints, Source
+from evplace.sources.readers import _columns, _order
+from evplace.sources.readers._order import Order
+from evplace.sources.readers._source import Block, Hints, Source, ordered, printable
 from evplace.sources.readers._text_numbers import parse
+from evplace.sources.readers._text_stream import HEAD, is_text, opened
+from evplace.sources.readers._zip import members
 
 ABOUT = "text, one event a line (.txt, .csv, also in .zip or .gz)"
+TABLE = True
 BYTES = 1 << 20
-"""Bytes parsed at a time."""
-HEAD = 1 << 14
-"""Bytes that hold the first lines."""
-ORDERS = ((0, 1, 2, 3), (3, 0, 1, 2), (2, 0, 1, 3))
-"""Columns of t, x, y and p in `t x y p`, `x y p t` and `x y t p`."""
+"""Bytes parsed at a time, and looked at for the order of the columns."""
+SAMPLE = 1 << 16
+"""Rows from which the order of the columns is told."""
 FAULTS = (
     zipfile.BadZipFile,
     zlib.error,
@@ -45,27 +46,42 @@ FAULTS = (
     ValueError,
 )
 """What unpacking a damaged archive raises."""
+SIZE = re.compile(r"(?:geometry|resolution|sensor|size)\D{0,3}(\d{1,5})\s*[x, ]\s*(\d{1,5})\b", re.IGNORECASE)
+"""A remark that states width and height."""
 
 
-class _Layout(NamedTuple):
+class _Top(NamedTuple):
+    """What stands before the events."""
+
     start: int
     """First byte of the events."""
     lines: int
     """Lines before it."""
+    first: str
+    """The first line of an event."""
+    names: list[str]
+    """Of the columns; empty where no line gives them."""
+    size: Size | None
+
+
+class _Layout(NamedTuple):
+    member: str | None
+    """The file's name in an archive."""
+    start: int
+    lines: int
     columns: int
-    order: tuple[int, int, int, int]
-    """The columns of t, x, y and p."""
+    order: Order
     time_name: str
     size: Size | None
+    notes: list[str]
 
 
 def matches(path: Path, head: bytes) -> bool:
     """Whether its first lines, unpacked where need be, are events as text."""
-    if path.is_dir() or not (head[:2] in (b"PK", b"\x1f\x8b") or _is_text(head[:HEAD])):
+    if path.is_dir() or not (head[:2] in (b"PK", b"\x1f\x8b") or is_text(head[:HEAD])):
         return False
     try:
-        with _opened(path) as file:
-            return _layout(file.read(HEAD)) is not None
+        return any(_is_table(path, member) for member in _members(path))
     except FAULTS:
         return False
 
@@ -73,93 +89,132 @@ def matches(path: Path, head: bytes) -> bool:
 def read(path: Path, hints: Hints) -> Source:
     """Columns, sensor and unit; RecordingError where the columns or the unit of time are not clear."""
     try:
-        with _opened(path) as file:
-            layout = _layout(file.read(HEAD))
+        held = _members(path)
+        streams = [name for name in held if name is not None and _is_table(path, name)]
+        streams = ordered(path, streams, hints.stream) if streams else []
+        layout = _layout(path, streams[0] if streams else held[0] if held else None, hints)
     except FAULTS as error:
         raise RecordingError(f"{path} cannot be unpacked: {error}") from error
     if layout is None:
-        raise RecordingError(
-            f"{path}: the columns t, x, y and p cannot be told apart: name them in a first line"
-        )
+        raise RecordingError(f"{path}: no line holds t, x, y and p: give `columns=t,x,y,p` in their order")
     sample = _time_sample(path, layout)
     unit, notes = _columns.time_unit(layout.time_name, sample, hints) if len(sample) else ("us", [])
-    return Source(layout.size, partial(_blocks, path, layout, unit), notes)
+    return Source(layout.size, partial(_blocks, path, layout, unit), [*layout.notes, *notes], streams=streams)
 
 
-def _is_text(head: bytes) -> bool:
-    return bool(head) and re.fullmatch(rb"[\t\n\r\x20-\x7e]*", head) is not None
-
-
-@contextmanager
-def _opened(path: Path) -> Generator[IO[bytes], None, None]:
-    """The text as a stream, from the first .txt or .csv of an archive that holds events."""
+def _members(path: Path) -> list[str | None]:
+    """The texts in a zip archive, those of events first; for any other file None, the file itself."""
     with path.open("rb") as file:
-        magic = file.read(2)
-    if magic == b"\x1f\x8b":
-        with gzip.open(path) as packed:
-            yield packed  # type: ignore[misc]  # a GzipFile reads like any binary file
-    elif magic == b"PK":
-        with zipfile.ZipFile(path) as archive, archive.open(_member(archive)) as member:
-            yield member
-    else:
-        with path.open("rb") as file:
-            yield file
+        if file.read(2) != b"PK":
+            return [None]
+    return [*sorted(members(path, ".txt", ".csv"), key=lambda name: ("event" not in name, name))]
 
 
-def _member(archive: zipfile.ZipFile) -> str:
-    for name in sorted(archive.namelist(), key=lambda name: ("event" not in name, name)):
-        if name.lower().endswith((".txt", ".csv")):
-            with archive.open(name) as file:
-                if _layout(file.read(HEAD)) is not None:
-                    return name
-    raise ValueError("no file in it holds events as text")
+def _is_table(path: Path, member: str | None) -> bool:
+    """Whether a text holds events, be the order of their columns clear or not."""
+    try:
+        return _layout(path, member, Hints()) is not None
+    except RecordingError:
+        return True
 
 
-def _layout(head: bytes) -> _Layout | None:
-    """Where the events start and which column is which; None where the first lines are no events."""
+def _layout(path: Path, member: str | None, hints: Hints) -> _Layout | None:
+    """Where the events start and which column is which; None where the first lines are no events.
+
+    RecordingError, with the first line, where it could be more than one.
+    """
+    with opened(path, member) as file:
+        head = file.read(BYTES)
+    top = _top(head) if is_text(head[:HEAD]) else None
+    if top is None:
+        return None
+    columns = len(_cells(top.first))
+    where = f"{path}: line {top.lines + 1} ('{printable(top.first[:60])}')"
+    if ";" in top.first and "," in top.first:
+        raise UnsupportedError(f"{where} has decimal commas, which are not read: write numbers with points")
+    names = [""] * (columns - len(top.names)) + top.names if 0 <= columns - len(top.names) <= 1 else []
+    size = hints.size or top.size
+    try:
+        order, notes = _which(names, head[top.start :], columns, hints, size)
+    except _order.UnclearError as error:
+        raise RecordingError(f"{where}: {error}: give `columns=t,x,y,p` in their order") from error
+    if order is None:
+        return None
+    time_name = "t_s" if order.part is not None else names[order.t] if names and not hints.columns else "t"
+    return _Layout(member, top.start, top.lines, columns, order, time_name, top.size, notes)
+
+
+def _top(head: bytes) -> _Top | None:
+    """What stands before the first line of four numbers or more; None where there is no such line."""
     names: list[str] = []
     size, position = None, 0
-    for number, line in enumerate(head.splitlines(keepends=True)):
-        words = re.split(r"[\s,;]+", line.decode("ascii", "replace").strip(" \t\r\n,;"))
-        if (
-            len(words) == 2
-            and number == 0
-            and all(word.isdigit() and 0 < int(word) < 1 << 16 for word in words)
-        ):
-            size = int(words[0]), int(words[1])
-        elif _columns.named([word.lstrip("#") for word in words if word != "#"]) is not None:
-            names = [word.lstrip("#").lower() for word in words if word != "#"]
-        elif words != [""] and not words[0].startswith("#"):
-            order = _order(names, head[position:])
-            columns = len(names) or 4
-            if order is None or len(words) != columns:
-                return None
-            time_name = names[order[0]] if names else "t"
-            return _Layout(position, number, columns, order, time_name, size)
-        position += len(line)
+    for number, raw in enumerate(head.split(b"\n")):
+        line = raw.decode("utf-8", "replace").strip(" \t\r")
+        words = _cells(line)
+        remark = re.match(r"[#%]+", line)
+        if remark is None and len(words) >= 4 and all(map(_is_number, words)):
+            return _Top(position, number, line, names, size or _size_of_names(names))
+        stated = SIZE.search(line) if remark else re.fullmatch(r"(\d{1,5})[\s,;]+(\d{1,5})", line)
+        if stated is not None and (remark is not None or number == 0):
+            size = _possible(int(stated.group(1)), int(stated.group(2)))
+        elif words and len(said := _named_cells(line[remark.end() :] if remark else line)) >= 4:
+            if remark is None or _order.complete(_order.named(said)) is not None:
+                names = said
+        elif words and remark is None:
+            return None
+        position += len(raw) + 1
     return None
 
 
-def _order(names: list[str], head: bytes) -> tuple[int, int, int, int] | None:
-    """The columns of t, x, y and p: by their names, else by which of the ends has the times."""
-    if names:
-        named = _columns.named(names)
-        assert named is not None
-        return (
-            names.index(named["t"]),
-            names.index(named["x"]),
-            names.index(named["y"]),
-            names.index(named["p"]),
-        )
-    whole, fraction, used, _ = parse(np.frombuffer(head[: head.rfind(b"\n") + 1] or head, np.uint8), 4, 1000)
-    if used == 0 or not len(whole):
-        return None
-    signs = np.isin(whole, (-1, 0, 1)).all(axis=0) & (fraction == 0).all(axis=0)
-    for order in ORDERS:
-        rising = np.diff(whole[:, order[0]]) >= 0
-        if signs[order[3]] and not fraction[:, order[1:3]].any() and rising.sum() >= 0.9 * len(rising):
-            return order
-    return None
+def _cells(line: str) -> list[str]:
+    """The words of a line of numbers."""
+    return [word for word in re.split(r"[\s,;\"']+", line) if word]
+
+
+def _named_cells(line: str) -> list[str]:
+    """The names in a line, in which commas keep an empty one's place."""
+    mark = next((mark for mark in ",;\t" if mark in line), None)
+    return [word.strip(" \t\r\"'") for word in (line.split(mark) if mark else line.split())]
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return word.lower() in ("true", "false", "on", "off")
+    return "_" not in word
+
+
+def _size_of_names(names: list[str]) -> Size | None:
+    """The sensor in names such as x@320 and y@240."""
+    sides = {name[:1].lower(): re.search(r"@(\d{1,5})$", name) for name in names}
+    width, height = sides.get("x"), sides.get("y")
+    return None if width is None or height is None else _possible(int(width.group(1)), int(height.group(1)))
+
+
+def _possible(width: int, height: int) -> Size | None:
+    return (width, height) if 0 < width <= 1 << 16 and 0 < height <= 1 << 16 else None
+
+
+def _which(
+    names: list[str], rows: bytes, columns: int, hints: Hints, size: Size | None
+) -> tuple[Order | None, list[str]]:
+    """The order of the columns, and a note where it is told by their values."""
+    if hints.columns is not None:
+        if len(hints.columns) != columns:
+            raise _order.UnclearError(f"it has {columns} columns, not the {len(hints.columns)} of `columns`")
+        return _order.said(hints.columns), []
+    found = _order.named([name.partition("@")[0] for name in names])
+    order = _order.complete(found)
+    if order is not None:
+        return order, []
+    if names and not found and columns != 4:
+        return None, []
+    whole, fraction, _, _ = parse(
+        np.frombuffer(rows[: rows.rfind(b"\n") + 1] or rows + b"\n", np.uint8), columns, 1 << 16
+    )
+    order = _order.by_values(whole + fraction / 1e9, found, size) if len(whole) else None
+    return (None, []) if order is None else (order, [order.note(columns)])
 
 
 def _time_sample(path: Path, layout: _Layout) -> NDArray[np.float64] | NDArray[np.int64]:
@@ -169,22 +224,27 @@ def _time_sample(path: Path, layout: _Layout) -> NDArray[np.float64] | NDArray[n
             whole, fraction = next(parts)
         except (StopIteration, DamagedRecordingError):
             return np.empty(0, np.int64)
-    t, rest = whole[:, layout.order[0]], fraction[:, layout.order[0]]
+    t, rest = whole[:, layout.order.t], _billionths(whole, fraction, layout.order)
     return t + rest / 1e9 if rest.any() else t
+
+
+def _billionths(whole: NDArray[np.int64], fraction: NDArray[np.int64], order: Order) -> NDArray[np.int64]:
+    """The billionths of the times, which may stand in a column of their own."""
+    return fraction[:, order.t] if order.part is None else whole[:, order.part] * order.part_ns
 
 
 def _parsed(
     path: Path, layout: _Layout
 ) -> Generator[tuple[NDArray[np.int64], NDArray[np.int64]], None, None]:
     """Whole parts and billionths, (N, columns) each; DamagedRecordingError at a line that is no event."""
-    lines, kept = layout.lines, b""
+    lines, kept, before = layout.lines, b"", layout.start
     try:
-        with _opened(path) as file:
-            file.read(layout.start)
+        with opened(path, layout.member) as file:
             while True:
                 data = file.read(BYTES)
                 text = kept + data
                 text = text if data or text.endswith(b"\n") or not text else text + b"\n"
+                text, before = text[before:], max(0, before - len(text))
                 end = text.rfind(b"\n") + 1
                 run = np.frombuffer(text, np.uint8, end)
                 whole, fraction, used, seen = parse(run, layout.columns, len(run) // (2 * layout.columns) + 1)
@@ -202,8 +262,11 @@ def _parsed(
 
 
 def _blocks(path: Path, layout: _Layout, unit: str) -> Iterator[Block]:
+    order = layout.order
+    us_per_unit = int(_columns.US_PER_UNIT[unit])  # 0 for nanoseconds: their fractions do not count
     for whole, fraction in _parsed(path, layout):
-        t, x, y, p = layout.order
-        block = _columns.block(whole[:, t], whole[:, x], whole[:, y], whole[:, p], unit)
-        us_per_unit = int(_columns.US_PER_UNIT[unit])  # 0 for nanoseconds: their fractions do not count
-        yield block._replace(t_us=block.t_us + (fraction[:, t] * us_per_unit + 500_000_000) // 1_000_000_000)
+        block = _columns.block(
+            whole[:, order.t], whole[:, order.x], whole[:, order.y], whole[:, order.p], unit
+        )
+        rest = _billionths(whole, fraction, order)
+        yield block._replace(t_us=block.t_us + (rest * us_per_unit + 500_000_000) // 1_000_000_000)
