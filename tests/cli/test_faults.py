@@ -404,6 +404,6 @@ def test_guesses_are_told_and_unclear_ones_refused(folder: Path, street: Path, c
         message = capsys.readouterr().err
         assert "evplace: times in 't' are taken as us" in message
         assert ("128x128 inferred from its events" in message) == (size[1] not in command)
-    np.savez(folder / "unclear.npz", t=events.t_us * 1000, x=events.x, y=events.y, p=events.p)
+    np.savez(folder / "unclear.npz", t=events.t_us * 30, x=events.x, y=events.y, p=events.p)
     message = fault(capsys, "images", folder / "unclear.npz", "-o", folder / "u")
-    assert "give the time unit" in message
+    assert "give --time-unit" in message

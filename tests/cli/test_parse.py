@@ -227,7 +227,7 @@ def test_the_help_shows_all_parts_and_presets(capsys: Capture, monkeypatch: pyte
         ("[images]\nwidth = 0", "'width' cannot be 0"),
         ('[windows]\ndt = "soon"', "'dt' cannot be 'soon'"),
         ('dt = "1/30"', "unknown setting 'dt': did you mean 'windows.dt'?"),
-        ("[colours]", "unknown setting 'colours': known are "),
+        ("[colours]", "unknown setting 'colours': did you mean 'columns'? known are "),
         ("size = 3", "'size' cannot be 3: it takes a list of 2, each a whole number"),
         ("size = [3]", "'size' cannot be [3]"),
         ("size = [3, 4, 5]", "'size' cannot be [3, 4, 5]"),

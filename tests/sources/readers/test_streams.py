@@ -120,7 +120,8 @@ def test_the_first_is_read_and_the_others_are_named(name: str, tmp_path: Path) -
     recording = open_recording(path)
     assert recording.streams == [left, right]
     assert (
-        recording.notes[0] == f"events are read from {left}; there are also {right}: choose with stream=NAME"
+        recording.notes[0]
+        == f"events are read from {left}; there are also {right}: choose with `stream=NAME`"
     )
     assert same(path, None, LEFT)
 
@@ -153,7 +154,9 @@ def test_cameras_may_be_chosen_by_number(tmp_path: Path) -> None:
 def test_a_format_of_one_stream_takes_no_name(tmp_path: Path) -> None:
     path = tmp_path / "one.dat"
     path.write_bytes(b"% Version 2\n% Width 640\n% Height 480\n\x0c\x08" + bytes(80))
-    with pytest.raises(RecordingError, match=r"DAT file\) has one stream, without a name: leave stream out"):
+    with pytest.raises(
+        RecordingError, match=r"DAT file\) has one stream, without a name: leave out `stream`"
+    ):
         open_recording(path, stream="left")
     with pytest.raises(RecordingError, match=r"DAT file\) has no columns"):
         open_recording(path, columns="t,x,y,p")

@@ -105,7 +105,7 @@ def test_what_cannot_be_known_is_asked_for(file: Writer, tmp_path: Path) -> None
     path = file(tmp_path, table("txypw", "f8"))
     assert same(path)  # the fraction is none of the four
     path = file(tmp_path, np.hstack([table("txy", "i8"), table("pp", "i8")]))
-    with pytest.raises(RecordingError, match="columns 4 and 5 could both be p: give columns=t,x,y,p in"):
+    with pytest.raises(RecordingError, match="columns 4 and 5 could both be p: give `columns=t,x,y,p` in"):
         open_recording(path)
     assert same(path, columns="t,x,y,p,-")
     path = file(tmp_path, table("txxyp", "i8"))
@@ -119,7 +119,7 @@ def test_the_caller_says_that_y_stands_first(file: Writer, tmp_path: Path) -> No
     path = file(tmp_path, table("yxpt", "i8"))
     assert same(path, columns="y,x,p,t")
     assert same(path, size=(240, 180)), "only this way does it fit the sensor"
-    told = "it could be x,y,p,t of a sensor taller than wide, or y,x,p,t: give columns="
+    told = "it could be x,y,p,t of a sensor taller than wide, or y,x,p,t: give `columns="
     with pytest.raises(RecordingError, match=told):
         open_recording(path)
     for wrong in ("y,x,p", "y,x,p,p", "t,sec,x,y,p", ""):

@@ -124,7 +124,7 @@ def test_text_as_people_have_it(name: str, tmp_path: Path) -> None:
     assert told == (
         []
         if order is None
-        else [f"columns are taken as {order} by their values: where wrong, give columns=t,x,y,p"]
+        else [f"columns are taken as {order} by their values: if wrong, give `columns=t,x,y,p`"]
     )
 
 
@@ -181,7 +181,7 @@ def test_what_cannot_be_known_is_asked_for(name: str, tmp_path: Path) -> None:
     path = tmp_path / "events.csv"
     path.write_text(head + lines(form))
     line = head.count("\n") + 1
-    with pytest.raises(RecordingError, match=rf"line {line} \('.*'\): {told}.*give columns=t,x,y,p"):
+    with pytest.raises(RecordingError, match=rf"line {line} \('.*'\): {told}.*give `columns=t,x,y,p`"):
         open_recording(path)
     back = Events.concatenate(list(open_recording(path, SIZE, columns=columns).packets()))
     for field in ("t_us", "x", "y", "p"):

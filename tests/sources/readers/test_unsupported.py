@@ -217,12 +217,12 @@ NONSENSE: dict[str, tuple[Callable[[Path], Path], str]] = {
         holding(b"% Version 2\n% Width 240\n% Height 180\n\x0c\x08" + noise(4, 80_000)),
         "left out",
     ),
-    "too slow": (slow, "3,000 events in 99,9.* s are fewer than a camera sends: give time_unit=UNIT"),
-    "too fast": (fast, "3,000 events in 1e-06 s are more than a camera sends: give time_unit=UNIT"),
+    "too slow": (slow, "3,000 events in 99,9.* s are fewer than a camera sends: give `time_unit=UNIT`"),
+    "too fast": (fast, "3,000 events in 1e-06 s are more than a camera sends: give `time_unit=UNIT`"),
     "in no order": (shuffled, "most of which are earlier than one before them: sort it"),
     "beyond the sensor": (
         large,
-        "lie outside the sensor of 240x180 pixels: give size=WIDTH HEIGHT",
+        "lie outside the sensor of 240x180 pixels: give `size` if",
     ),
 }
 

@@ -101,7 +101,7 @@ def _of_table(name: str, kind: Kind, sample: Sample, hints: Hints, size: Size | 
         return f"{error}: give `columns=t,x,y,p` in their order"
     if order is None:
         return None
-    note = f"columns are taken as {order.words(count)} by their values; where that is wrong, give `columns=NAMES`"
+    note = f"columns are taken as {order.words(count)} by their values; where wrong, give `columns=NAMES`"
     return _laid_out(order, _columns(name, count), ["t"] * count)._replace(notes=(note,))
 
 

@@ -67,9 +67,7 @@ class Order(NamedTuple):
 
     def note(self, count: int) -> str:
         """What is to be said where the values told it."""
-        return (
-            f"columns are taken as {self.words(count)} by their values: where wrong, give `columns=t,x,y,p`"
-        )
+        return f"columns are taken as {self.words(count)} by their values: if wrong, give `columns=t,x,y,p`"
 
 
 class UnclearError(ValueError):
