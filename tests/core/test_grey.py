@@ -47,5 +47,6 @@ def test_floats_keep_their_kind_and_shapes_their_front() -> None:
     light = np.random.default_rng(0).random((2, 5, 4, 3))
     for kind in (np.float32, np.float64):
         assert luminance(light.astype(kind)).dtype == kind
+    np.testing.assert_allclose(luminance(light), np.einsum("nhwc,c->nhw", light, BT601), rtol=1e-14)
     assert luminance(light).shape == (2, 5, 4)
     assert luminance(np.zeros((4, 3), np.uint8)).dtype == np.float64

@@ -104,6 +104,28 @@ def test_the_old_output_stands_until_the_new_one_is_whole(tmp_path: Path) -> Non
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "out"]
 
 
+@pytest.mark.parametrize("overwritten", [True, False])
+def test_an_output_that_cannot_take_its_name_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overwritten: bool
+) -> None:
+    rename = Path.rename
+
+    def refused(path: Path, target: Path) -> Path:
+        if "partial" in path.name:
+            raise OSError(errno.EIO, "Input/output error", str(path))
+        return rename(path, target)
+
+    if overwritten:
+        (tmp_path / "file").write_text("old")
+    monkeypatch.setattr(Path, "rename", refused)
+    with (
+        pytest.raises(OutputError, match="cannot write"),
+        new_file(tmp_path / "file", overwrite=True) as file,
+    ):
+        file.write_text("new")
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("file", "old")] * overwritten
+
+
 def test_a_name_keeps_its_suffix_while_it_is_written(tmp_path: Path) -> None:
     """Writers choose their format by it."""
     with new_file(tmp_path / "drive.tar.npz") as file:

@@ -105,7 +105,7 @@ def test_one_that_dies_before_it_has_its_job_is_told(tmp_path: Path, monkeypatch
 
 
 def test_a_worker_ends_with_its_caller(module: str) -> None:
-    with start(module, {"does": "wait"}) as process:
+    with start(module, {"does": "wait", "lines": 0}) as process:
         assert process.stdin is not None
         process.stdin.close()
         assert process.wait(timeout=HANG_S) == 1

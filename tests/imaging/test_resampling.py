@@ -138,7 +138,7 @@ def test_sums_too_large_for_whole_numbers_go_through_floats() -> None:
 
 @pytest.mark.parametrize(
     ("rows", "columns"),
-    [((97, 64), (50, 33)), ((63, 40), (63, 40)), ((64, 40), (65, 40)), ((960, 90), (97, 64))],
+    [((97, 64), (50, 33)), ((63, 40), (63, 40)), ((960, 90), (97, 64))],
 )
 def test_sums_stay_in_the_numbers_that_hold_them(rows: tuple[int, int], columns: tuple[int, int]) -> None:
     """A canvas that is set everywhere makes every sum as large as it can be: on both sides of each limit."""

@@ -207,7 +207,12 @@ def _replace(target: Path, partial: Path) -> None:
     old = target.with_name(f".{target.name}.old")
     if target.exists():
         target.rename(old)
-    partial.rename(target)
+    try:
+        partial.rename(target)
+    except OSError:
+        if old.exists():
+            old.rename(target)
+        raise
     _fsync(target.parent)
     if old.is_dir():
         shutil.rmtree(old)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from made_results import make_result, make_unanswered
 from PIL import Image
@@ -25,11 +25,12 @@ from evplace_lab.report._html import Html, tag
 from evplace_lab.report._panels import CLOSE, MOST_CURVES, STYLES, _visible, panels, result_line
 from evplace_lab.report._pictures import LEVELS, _evenly, _source, sample_images
 
-share = st.floats(0, 1) | st.just(math.nan)
+share = st.floats(0, 1) | st.integers(0, 9).map(lambda step: step * 0.0007) | st.just(math.nan)
 names = st.text("ab12", min_size=1, max_size=6)
 
 
 @given(st.lists(st.tuples(share, share, st.floats(allow_nan=True)), max_size=40))
+@example([(0.1, 0.1, 1.0), (0.101, 0.1, 2.0)])
 def test_points_are_left_out_only_beside_one_that_is_kept(points: list[tuple[float, float, float]]) -> None:
     kept = _visible(points)
     known = [point for point in points if not math.isnan(point[0]) and not math.isnan(point[1])]
