@@ -8,6 +8,7 @@ they wrapped in the packet's header.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import re
 import struct
 from collections.abc import Iterator
@@ -60,10 +61,13 @@ def read(path: Path, hints: Hints) -> Source:
 
 
 def _senders(path: Path, start: int, known: dict[int, str]) -> list[int]:
-    """The numbers of the sources that send change events; where none does, those of the header."""
+    """The numbers of the sources that send change events; where none does, those of the header.
+
+    Where the header names one only, it is the first that sends.
+    """
     found: dict[int, None] = {}
     with path.open("rb") as file, contextlib.suppress(DamagedRecordingError):
-        for packet in _packets(path, file, start):
+        for packet in itertools.islice(_packets(path, file, start), 1 if len(known) == 1 else None):
             found[packet.source] = None
     return list(found or known or (0,))
 

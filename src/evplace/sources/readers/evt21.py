@@ -24,6 +24,8 @@ from evplace.sources.readers._source import Block, Hints, Source
 ABOUT = "Prophesee raw file, EVT 2.1"
 WORDS = 1 << 17
 """Words decoded at a time; a word gives 32 events at most."""
+SAMPLE = 1 << 14
+"""Words from which their order is told."""
 TIME_HIGH = 0x8
 """The kind of word that sends the upper bits of the time."""
 STEP = 1 << 27
@@ -56,7 +58,7 @@ def _order(path: Path, fields: dict[str, str], start: int) -> tuple[str, list[st
                 f"{path} has its words in the order '{stated.group(1)}': little and legacy are read"
             )
         return stated.group(1), []
-    run = np.frombuffer(head_of(path, start + 8 * WORDS)[start:], "<u1")
+    run = np.frombuffer(head_of(path, start + 8 * SAMPLE)[start:], "<u1")
     run = run[: len(run) // 8 * 8].view("<u8")
     order = "legacy" if _steps(_swapped(run)) > _steps(run) else "little"
     return order, [f"the header states no order of the words of EVT 2.1: in '{order}' order the clock runs"]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 import zipfile
 import zlib
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -33,8 +33,8 @@ ABOUT = "text, one event a line (.txt, .csv, also in .zip or .gz)"
 TABLE = True
 BYTES = 1 << 20
 """Bytes parsed at a time, and looked at for the order of the columns."""
-SAMPLE = 1 << 16
-"""Rows from which the order of the columns is told."""
+SAMPLE, FEW = 1 << 15, 1 << 11
+"""Rows from which the order of the columns is told, and from which it is only asked whether they have one."""
 FAULTS = (
     zipfile.BadZipFile,
     zlib.error,
@@ -113,12 +113,12 @@ def _members(path: Path) -> list[str | None]:
 def _is_table(path: Path, member: str | None) -> bool:
     """Whether a text holds events, be the order of their columns clear or not."""
     try:
-        return _layout(path, member, Hints()) is not None
+        return _layout(path, member, Hints(), FEW) is not None
     except RecordingError:
         return True
 
 
-def _layout(path: Path, member: str | None, hints: Hints) -> _Layout | None:
+def _layout(path: Path, member: str | None, hints: Hints, rows: int = SAMPLE) -> _Layout | None:
     """Where the events start and which column is which; None where the first lines are no events.
 
     RecordingError, with the first line, where it could be more than one.
@@ -135,7 +135,7 @@ def _layout(path: Path, member: str | None, hints: Hints) -> _Layout | None:
     names = [""] * (columns - len(top.names)) + top.names if 0 <= columns - len(top.names) <= 1 else []
     size = hints.size or top.size
     try:
-        order, notes = _which(names, head[top.start :], columns, hints, size)
+        order, notes = _which(names, columns, partial(_rows, head[top.start :], columns, rows), hints, size)
     except _order.UnclearError as error:
         raise RecordingError(f"{where}: {error}: give `columns=t,x,y,p` in their order") from error
     if order is None:
@@ -196,8 +196,19 @@ def _possible(width: int, height: int) -> Size | None:
     return (width, height) if 0 < width <= 1 << 16 and 0 < height <= 1 << 16 else None
 
 
+def _rows(text: bytes, columns: int, rows: int) -> NDArray[np.float64]:
+    """The first rows, (n, columns)."""
+    run = np.frombuffer(text[: text.rfind(b"\n") + 1] or text + b"\n", np.uint8)
+    whole, fraction, _, _ = parse(run, columns, rows)
+    return np.asarray(whole + fraction / 1e9, np.float64)
+
+
 def _which(
-    names: list[str], rows: bytes, columns: int, hints: Hints, size: Size | None
+    names: list[str],
+    columns: int,
+    sample: Callable[[], NDArray[np.float64]],
+    hints: Hints,
+    size: Size | None,
 ) -> tuple[Order | None, list[str]]:
     """The order of the columns, and a note where it is told by their values."""
     if hints.columns is not None:
@@ -206,15 +217,11 @@ def _which(
         return _order.said(hints.columns), []
     found = _order.named([name.partition("@")[0] for name in names])
     order = _order.complete(found)
-    if order is not None:
+    if order is not None or (names and not found and columns != 4):
         return order, []
-    if names and not found and columns != 4:
-        return None, []
-    whole, fraction, _, _ = parse(
-        np.frombuffer(rows[: rows.rfind(b"\n") + 1] or rows + b"\n", np.uint8), columns, 1 << 16
-    )
-    order = _order.by_values(whole + fraction / 1e9, found, size) if len(whole) else None
-    return (None, []) if order is None else (order, [order.note(columns)])
+    rows = sample()
+    order = _order.by_values(rows, found, size) if len(rows) else None
+    return order, [] if order is None else [order.note(columns)]
 
 
 def _time_sample(path: Path, layout: _Layout) -> NDArray[np.float64] | NDArray[np.int64]:
