@@ -100,7 +100,7 @@ def run(args: Args) -> int:
         print_facts(str(args.out), {name: result.figures[name] for name in SHOWN if name in result.figures})
     note_guesses(query.info.get("notes"))
     if query.info.get("fault"):
-        note(f"{query.info['fault']}; what came before it was measured")
+        note(f"{query.info['fault']}; the good part was measured")
         return USED_GOOD_PART
     return 0
 

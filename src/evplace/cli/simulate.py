@@ -18,7 +18,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json, remarks
+from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
 from evplace.core import settings as settings_room
 from evplace.core.errors import DamagedRecordingError
 from evplace.core.events import Events
@@ -41,6 +41,8 @@ class Args:
     """A setting of the sensor over the preset's, as name=value: threshold_on=0.15."""
     fps: float = 30.0
     """Images a second of a folder without times."""
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None
+    """Unit of the images' times, in timestamps.txt or in their names."""
     seed: int = 0
     """Draws the pixels' thresholds and the noise."""
     overwrite: bool = False
@@ -53,7 +55,7 @@ def run(args: Args) -> int:
     """Simulate and write."""
     values = settings_room.from_pairs(args.set)
     sensor = settings_room.make(SensorSettings, values, PRESETS[args.preset])
-    film = open_film(args.film, args.fps)
+    film = open_film(args.film, args.fps, args.time_unit)
     packets = _Counted(simulate(film, film.size, sensor, args.seed))
     fault = None
     with remarks():
@@ -61,6 +63,7 @@ def run(args: Args) -> int:
             write_recording(args.out, packets, film.size, overwrite=args.overwrite)
         except DamagedRecordingError as error:
             fault = str(error)
+    note_guesses(film.notes)
     events = packets.events
     facts = {
         "events": events,
@@ -74,7 +77,7 @@ def run(args: Args) -> int:
     else:
         print_facts(str(args.out), {"events": events, "sensor": f"{film.size[0]} x {film.size[1]}"})
     if fault is not None:
-        note(f"{fault}; the images before it were simulated")
+        note(f"{fault}; the good part was simulated")
     return USED_GOOD_PART if fault is not None else 0
 
 

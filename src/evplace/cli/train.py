@@ -107,7 +107,7 @@ def run(args: Args) -> int:
     print_json(facts) if args.json else print_facts(str(args.out), facts)
     note_guesses(day.info.get("notes"))
     if day.info.get("fault"):
-        note(f"{day.info['fault']}; what came before it was learned")
+        note(f"{day.info['fault']}; the good part was learned")
         return USED_GOOD_PART
     return 0
 

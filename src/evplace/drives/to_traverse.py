@@ -6,7 +6,7 @@ import dataclasses
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,7 @@ from evplace.sources.frames import is_frames, open_frames
 from evplace.sources.readers import Recording, is_recording, open_recording
 from evplace.sources.simulators.recording import SimulatedRecording
 from evplace.sources.tracks import Track, open_track
+from evplace.sources.tracks._apart import apart, on_day_of
 
 T = TypeVar("T")
 Kind = Literal["events", "frames"]
@@ -69,8 +70,12 @@ def open_traverse(
     if (Path(path) / "traverse.json").exists():
         found = Traverse.load(path)
         _check_made_so(Path(path), found, cleaning, spacing, mask)
-        aligned = _aligned(_opened(track), found.t_us)
-        return found if aligned is None else dataclasses.replace(found, track=aligned)
+        given = _opened(track)
+        positions = None if given is None else on_day_of(given, int(found.t_us[0]))
+        aligned = _aligned(positions, found.t_us)
+        if aligned is None:
+            return found
+        return dataclasses.replace(found, track=aligned, info=found.info | _said(positions, found.info))
     with tempfile.TemporaryDirectory(prefix="evplace-") as folder:
         writer = TraverseWriter(Path(folder), {})
         try:
@@ -94,24 +99,29 @@ def open_source(
 ) -> Drive:
     """What `path` holds, as a drive: see `open_traverse`; `listing` and `fps` as in `open_frames`.
 
-    A folder is a data set where it has the layout of one, whatever else lies in it. `size` and `time_unit`
-    are for a recording, `drive` and `dataset` for a data set's folder, `listing` and `fps` for a folder of
-    images; SettingsError where one is given that has no meaning for what `path` is.
+    A folder is a data set where it has the layout of one, whatever else lies in it. `size` is for
+    a recording, `time_unit` for one or for images with times, `drive` and `dataset` for a data set's folder,
+    `listing` and `fps` for a folder of images; SettingsError where one is given that has no meaning for what
+    `path` is.
     """
     place = Path(path)
-    of_recordings: dict[str, object] = {"--size": size, "--time-unit": time_unit}
+    of_recordings: dict[str, object] = {"--size": size}
     of_images: dict[str, object] = {"--list": listing, "--fps": fps}
+    of_any = of_recordings | of_images | {"--time-unit": time_unit}
     is_folder = place.is_dir() and not is_recording(place)
     if drive is not None or dataset is not None or (is_folder and datasets.matching(place)):
-        _refuse(f"{place} is a data set, which has its own size, times and order", of_recordings | of_images)
+        _refuse(
+            f"{place} is a data set, which has its own size, times and order",
+            of_any,
+        )
         return datasets.open_drive(place, drive, dataset)
     if is_video(place):
-        _refuse(f"{place} is a video, which has its own size and times", of_recordings | of_images)
+        _refuse(f"{place} is a video, which has its own size and times", of_any)
         return Drive(open_film(place), simulate=True)
     for images in (place, place / "images") if is_folder else ():
         if is_frames(images):
             _refuse(f"{images} holds images, which have their own size", of_recordings)
-            return Drive(_listed_film(images, listing, fps))
+            return Drive(_listed_film(images, listing, fps, time_unit))
     _refuse(f"{place} is no folder of images", of_images)
     return Drive(_recording(place, size, time_unit))
 
@@ -128,7 +138,7 @@ def record(
     kind: Kind | None = None,
 ) -> str | None:
     """Write the images of a drive; what is not given is the drive's own. Returns what broke off, if any."""
-    positions = drive.track if track is None else _opened(track)
+    positions = on_its_day(drive.track if track is None else _opened(track), drive.source)
     windows, images = windows or drive.windows, images or drive.images
     mask = drive.mask if mask is None else mask
     source = _as(kind, drive)
@@ -159,7 +169,6 @@ def record_events(
         overlap.see(window.t_us)
         if spacer.keeps(window.t_us, window.events):
             writer.add(image, window.t_us, window.events)
-    fault = packets.fault
     overlap.check()
     writer.track = _aligned(track, np.array(writer.t_us, np.int64))
     writer.info |= {
@@ -170,15 +179,13 @@ def record_events(
         "images": settings_room.to_dict(images),
         "cleaning": settings_room.to_dict(cleaning),
         "spacing": settings_room.to_dict(spacer.settings),
-        "notes": recording.notes,
         "dropped": recording.dropped,
         "cleaned": stream.cleaned,
         "left_out": spacer.left_out,
-        "fault": fault,
-    }
+    } | _said(track, {"notes": recording.notes, "fault": packets.fault})
     if isinstance(recording, SimulatedRecording):
         writer.info["simulated"] = settings_room.to_dict(recording.sensor) | {"seed": recording.seed}
-    return fault
+    return _fault(writer)
 
 
 def record_frames(
@@ -191,11 +198,11 @@ def record_frames(
     """Write camera images, cropped and resized as `images` says; returns what broke off, as above."""
     images, spacer = images or ImageSettings(), Spacer(spacing, track)
     shape, frames, overlap = None, _GoodPart(film.images()), _Overlap(track)
-    for n, (t_us, frame) in enumerate(frames):
+    for t_us, frame in frames:
         shape = shape or frame.shape
         if frame.shape != shape:
             raise TraverseError(
-                f"{film.name(n)} is {frame.shape}, the images before it are {shape}: make them alike"
+                f"{film.name(t_us)} is {frame.shape}, the images before it are {shape}: make them alike"
             )
         overlap.see(t_us)
         if spacer.keeps(t_us, -1):
@@ -209,9 +216,8 @@ def record_frames(
         "images": settings_room.to_dict(images),
         "spacing": settings_room.to_dict(spacer.settings),
         "left_out": spacer.left_out,
-        "fault": frames.fault,
-    }
-    return frames.fault
+    } | _said(track, {"notes": film.notes, "fault": frames.fault})
+    return _fault(writer)
 
 
 def is_kept(drive: Drive, kind: Kind | None = None) -> bool:
@@ -226,8 +232,9 @@ def _refuse(what: str, flags: Mapping[str, object]) -> None:
         raise SettingsError(f"{what}: leave out {' and '.join(said)}")
 
 
-def _listed_film(folder: Path, listing: str | Path | None, fps: float | None) -> Film:
-    frames = open_frames(folder, listing) if fps is None else open_frames(folder, listing, fps)
+def _listed_film(folder: Path, listing: str | Path | None, fps: float | None, time_unit: str | None) -> Film:
+    rate = 30.0 if fps is None else fps
+    frames = open_frames(folder, listing, rate, time_unit)
     if frames.timed:
         _refuse(f"the images in {folder} have times of their own", {"--fps": fps})
     return film_of(folder, frames)
@@ -294,15 +301,32 @@ def _aligned(track: Track | None, t_us: NDArray[np.int64]) -> Track | None:
         return None
     aligned = track.at(t_us)
     if not aligned.known.any():
-        raise _apart(track, f"run from {_seconds(t_us)}")
+        raise TrackError(str(apart(track, int(t_us[0]), int(t_us[-1]))))
     return aligned
 
 
-def _apart(track: Track, images: str) -> TrackError:
-    return TrackError(
-        f"the track and the images do not overlap: the track runs from {_seconds(track.t_us)}, the images "
-        f"{images}; give the recording's own track, or shift the track's times"
-    )
+def on_its_day(track: Track | None, source: Recording | Film) -> Track | None:
+    """A track without dates takes that of the recording."""
+    if track is None or track.dated:
+        return track
+    if isinstance(source, Film):
+        first_us = next((t_us for t_us, _ in source.images()), None)
+    else:
+        first_us = next((int(events.t_us[0]) for events in source.packets() if len(events)), None)
+    return track if first_us is None else on_day_of(track, first_us)
+
+
+def _fault(writer: TraverseWriter) -> str | None:
+    fault: str | None = writer.info["fault"]
+    return fault
+
+
+def _said(track: Track | None, info: Mapping[str, Any]) -> dict[str, Any]:
+    """What was guessed and what broke off, of the recording and of its track."""
+    notes, fault = info.get("notes") or [], info.get("fault")
+    if track is None:
+        return {"notes": notes, "fault": fault}
+    return {"notes": [*notes, *track.notes], "fault": fault or track.fault}
 
 
 class _Overlap:
@@ -317,17 +341,13 @@ class _Overlap:
         if self._track is None:
             return
         if self._seen is None and t_us > self._track.t_us[-1]:
-            raise _apart(self._track, f"begin at {t_us / 1e6:.3f} s")
+            raise TrackError(str(apart(self._track, t_us, t_us)))
         self._seen = (self._seen or (t_us, t_us))[0], t_us
 
     def check(self) -> None:
         """After the last image; TrackError where it came before the track's begin."""
         if self._track is not None and self._seen is not None and self._seen[1] < self._track.t_us[0]:
-            raise _apart(self._track, f"run from {_seconds(np.array(self._seen))}")
-
-
-def _seconds(t_us: NDArray[np.int64]) -> str:
-    return f"{t_us[0] / 1e6:.3f} s to {t_us[-1] / 1e6:.3f} s"
+            raise TrackError(str(apart(self._track, *self._seen)))
 
 
 class _GoodPart(Generic[T]):
