@@ -15,8 +15,10 @@ from evplace.sources.tracks import open_track
 
 LOG = Log(12)
 ODD = [
-    b"", b"1e999999", b"-1e999999", b"1e-999999", b"9" * 40, b"-1", b"nan", b"inf", b"\x00", b"\xff\xfe", b'"',
-    b"+99:99", b"2020-13-45T99:99:99Z", b"0000-00-00T00:00:00Z", b"9999-12-31T23:59:59-23:59", b"$GPRMC,*00",
+    b"", b"1e999999", b"-1e999999", b"1e-999999", b"9" * 40, b"-1", b"nan", b"inf", b"\x00", b"\xff\xfe",
+    b'"',
+    b"+99:99",
+    b"2020-13-45T99:99:99Z", b"0000-00-00T00:00:00Z", b"9999-12-31T23:59:59-23:59", b"$GPRMC,*00",
     b"$GPRMC,100010.00,A*24", b",,,,,,,,,,,,,,", b"<trkpt>", b"&amp;", b"&x;", b"\n", b"\r", b"1,5", b"1.5.5",
     "٣".encode(), "²".encode(), b"1_000", b"0x10", b"N", b"-27.5S", b"91", b"-181", b"60Z", b"\x1b[2J",
 ]  # fmt: skip
@@ -27,7 +29,7 @@ LOGS = {
     "csv": csv_log(LOG),
     "iso": "\n".join(["time;lat;lon", *(f"{iso(t)};{lat};{lon}" for t, lat, lon, _, _ in LOG.rows())]),
     "utm": "timestamp,northing,easting,utm_zone\n"
-    + "1000000,5735500,620000,30U\n2000000,5735510,620000,30U\n" * 5,
+    + "\n".join(f"{n}000000,{5735500 + n},620000,30U" for n in range(10)),
     "gpx": gpx_log(LOG),
     "tum": "\n".join(f"{t} {n} {n} 0 0 0 0 1" for n, (t, *_) in enumerate(LOG.rows())),
 }

@@ -206,7 +206,7 @@ def _in_zone(fixes: Fixes, zone: int | None, northern: bool | None) -> tuple[Fix
     """The fixes with metres in one zone, by default that of the middle one; far ones are counted."""
     import utm
 
-    middle = float(np.median(fixes.longitude))
+    middle = float(np.sort(fixes.longitude)[len(fixes) // 2])  # of a fix: a mean of two may be of none
     if northern is None:
         northern = bool(np.median(fixes.latitude) >= 0)
     if zone is None:

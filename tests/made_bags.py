@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
 from made_logs import Log
 
 Topics = dict[tuple[str, str], list[bytes]]
