@@ -129,7 +129,18 @@ def test_without_positions_and_by_frames(files: Path, tmp_path: Path, capsys: Ca
         assert words in capsys.readouterr().err
     assert json_of(capsys, *query, "-o", tmp_path / "b")["accuracy"] > 0.9
     np.save(tmp_path / "truth.npy", np.eye(60))
-    assert json_of(capsys, *query, "-o", tmp_path / "c", "--truth", tmp_path / "truth.npy")["recall@1"] > 0.5
+    with_truth = (*query, "-o", tmp_path / "c", "--overwrite", "--truth", tmp_path / "truth.npy")
+    assert json_of(capsys, *with_truth)["recall@1"] > 0.5
+    main([*map(str, with_truth)])
+    assert "rows of" in capsys.readouterr().err.splitlines()[0]
+    np.save(tmp_path / "truth.npy", np.eye(60, k=3))
+    turned = json_of(capsys, *with_truth, "--layout", "reference-query")
+    assert capsys.readouterr().err == ""
+    np.save(tmp_path / "truth.npy", np.eye(60, k=-3))
+    straight = json_of(capsys, *with_truth, "--layout", "query-reference")
+    assert {**turned, "took_s": 0} == {**straight, "took_s": 0}
+    assert main([*map(str, (*query, "-o", tmp_path / "d", "--layout", "reference-query"))]) == 2
+    assert "--layout says what the rows of --truth are" in capsys.readouterr().err
 
 
 def test_convert_and_simulate_and_list(files: Path, tmp_path: Path, capsys: Capture) -> None:

@@ -96,3 +96,87 @@ def test_unknown_names_are_refused(scores, tmp_path) -> None:
         run(Args(scores, tmp_path / "m.csv", "fab-map"))
     with pytest.raises(SettingsError, match="unknown setting 'k'"):
         run(Args(scores, tmp_path / "m.csv", "graph", None, (("k", 5),)))
+
+
+def street(queries: int = 40, references: int = 60) -> np.ndarray:
+    """Distances of a drive along a street, with noise."""
+    apart = np.abs(np.arange(queries)[:, None] * references / queries - np.arange(references)[None])
+    return np.sqrt(apart) + np.random.default_rng(1).uniform(0.1, 0.5, apart.shape)
+
+
+def remarks(capsys, *arguments: object) -> list[str]:
+    """The remarks of a call that ends well."""
+    capsys.readouterr()
+    run(tyro.cli(Args, args=[str(argument) for argument in arguments]))
+    return capsys.readouterr().err.splitlines()
+
+
+@pytest.mark.parametrize("shape", [(40, 60), (60, 40), (40, 40), (30, 200), (200, 30)])
+def test_the_layout_turns_the_matrix_and_what_was_assumed_is_told(tmp_path, capsys, shape) -> None:
+    table = street(*shape)
+    np.save(tmp_path / "rows.npy", table)
+    np.save(tmp_path / "columns.npy", np.asfortranarray(table.T))
+    common = ["--distances", "--matcher", "best", "--overwrite"]
+    first = remarks(capsys, tmp_path / "rows.npy", "-o", tmp_path / "a.csv", *common)
+    assert first == [
+        "evplace: rows are taken for queries, columns for references: --layout reference-query turns them"
+    ]
+    turned = ["--layout", "reference-query"]
+    assert remarks(capsys, tmp_path / "columns.npy", "-o", tmp_path / "b.csv", *common, *turned) == []
+    given = ["--layout", "query-reference"]
+    assert remarks(capsys, tmp_path / "rows.npy", "-o", tmp_path / "c.csv", *common, *given) == []
+    assert len({(tmp_path / name).read_text() for name in ("a.csv", "b.csv", "c.csv")}) == 1
+    assert len(read(tmp_path / "a.csv")) == shape[0]
+
+
+@pytest.mark.parametrize("transform", [np.asarray, np.square, lambda d: d * 1000, np.log, lambda d: d - 100])
+@pytest.mark.parametrize("matcher", ["best", "seqslam"])
+def test_distances_taken_for_scores_are_told(tmp_path, capsys, transform, matcher) -> None:
+    np.save(tmp_path / "d.npy", transform(street()))
+    common = [tmp_path / "d.npy", "-o", tmp_path / "m.csv", "--overwrite", "--matcher", matcher]
+    layout = ["--layout", "query-reference"]
+    wrong = remarks(capsys, *common, *layout)
+    assert any("look like distances" in line and line.endswith("give --distances") for line in wrong)
+    assert not any("look like" in line for line in remarks(capsys, *common, *layout, "--distances"))
+    np.save(tmp_path / "d.npy", -transform(street()))
+    wrong = remarks(capsys, *common, *layout, "--distances")
+    assert any("look like scores" in line and line.endswith("leave out --distances") for line in wrong)
+
+
+def test_real_scores_are_taken_for_what_they_are(data, tmp_path, capsys) -> None:
+    """Of ten techniques, one or two have too little order to tell; none is told wrongly."""
+    tables = np.load(data / "scores" / "vprbench_corridor.npz")
+    names = [name for name in tables.files if tables[name].ndim == 2]
+    found = 0
+    for name in names:
+        np.save(tmp_path / "s.npy", tables[name])
+        common = [tmp_path / "s.npy", "-o", tmp_path / "m.csv", "--overwrite", "--matcher", "best"]
+        assert not any("look like" in line for line in remarks(capsys, *common))
+        found += any("look like scores" in line for line in remarks(capsys, *common, "--distances"))
+    assert found >= len(names) - 3
+
+
+@pytest.mark.parametrize(
+    ("shape", "ds"), [((10, 60), 15), ((60, 10), 15), ((4, 4), 5), ((14, 14), 15), ((1, 100), 2)]
+)
+def test_a_sequence_longer_than_a_side_is_one_line(tmp_path, shape, ds) -> None:
+    np.save(tmp_path / "s.npy", np.random.default_rng(0).random(shape))
+    with pytest.raises(ScoresError, match=rf"ds = {ds} queries fits {shape[0]} queries and {shape[1]} ref"):
+        run(Args(tmp_path / "s.npy", tmp_path / "m.csv", "seqslam", None, (("ds", ds),)))
+    assert not (tmp_path / "m.csv").exists()
+
+
+@pytest.mark.parametrize("matcher", ["graph", "dp"])
+@pytest.mark.parametrize("scores", [-street(), np.zeros((20, 20)), np.full((5, 9), -1e-3)])
+def test_scores_of_which_none_is_positive(tmp_path, matcher, scores) -> None:
+    np.save(tmp_path / "s.npy", scores)
+    with pytest.raises(ScoresError, match=f"no score is above 0, and {matcher} takes similarities"):
+        run(Args(tmp_path / "s.npy", tmp_path / "m.csv", matcher))
+    assert not (tmp_path / "m.csv").exists()
+
+
+@pytest.mark.parametrize("scores", [-street(), 0.5 * SCORES, SCORES - 1])
+def test_nothing_accepted_is_told_with_the_thresholds(tmp_path, capsys, scores) -> None:
+    np.save(tmp_path / "s.npy", scores)
+    lines = remarks(capsys, tmp_path / "s.npy", "-o", tmp_path / "m.csv")
+    assert any("no match is accepted" in line and "tau1=0.99" in line for line in lines)

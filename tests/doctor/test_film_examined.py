@@ -101,11 +101,11 @@ def test_one_frame_makes_no_events(tmp_path: Path) -> None:
     assert examine(film(tmp_path, [20.0], [0.0])).named("frames").state == "bad"
 
 
-def test_a_frame_that_cannot_be_read_ends_the_good_part(tmp_path: Path) -> None:
+def test_a_frame_that_cannot_be_read_is_left_out(tmp_path: Path) -> None:
     film(tmp_path, there_and_back(20, 0.5), even(20, 50))
     (tmp_path / "0010.png").write_bytes(b"no image")
     found = examine(tmp_path)
-    assert found.facts["frames"] == 10
+    assert found.facts["frames"] == 19
     assert found.fault is not None
     assert "0010.png" in found.fault
     assert state(found, "reading") == "bad"

@@ -75,3 +75,26 @@ def test_a_track_of_another_day_does_not_overlap() -> None:
 def test_one_fix_and_no_events() -> None:
     assert found(gps, EVENTS, "GPS fixes", road(T_S[:1], T_S[:1])).state == "bad"
     assert found(gps, Events.empty(SIZE), "GPS coverage", road(T_S, T_S)).state == "unknown"
+
+
+@pytest.mark.parametrize("ahead_s", [36_000, -18_000, 1024 * 7 * 86_400])
+def test_the_cause_of_times_apart_is_named_with_the_flag(ahead_s: int) -> None:
+    finding = found(gps, EVENTS, "GPS coverage", road(T_S + ahead_s, 8 * T_S))
+    assert finding.state == "bad"
+    assert "a time zone of" in finding.sentence or "1024 weeks" in finding.sentence
+    assert f"`offset_us={-ahead_s * 1_000_000}`" in finding.advice
+
+
+def test_what_was_left_out_of_the_log_is_told() -> None:
+    notes = (
+        "the log is not in the order of time: it was sorted",
+        "left out of the track: 3 no fix (first fix 1)",
+    )
+    track = replace(road(T_S, 8 * T_S), dropped={"no fix": 3}, notes=notes)
+    finding = found(gps, EVENTS, "GPS log", track)
+    assert (finding.state, finding.value) == ("look", 2)
+    assert "it was sorted. Left out of the track: 3 no fix (first fix 1)." in finding.sentence
+    damaged = found(gps, EVENTS, "GPS log", replace(track, fault="it breaks off"))
+    assert damaged.state == "bad"
+    assert damaged.sentence.startswith("The log is damaged: it breaks off. ")
+    assert "slow drift" in found(gps, EVENTS, "GPS fixes", track).sentence

@@ -100,6 +100,27 @@ def test_the_given_real_matrix(data: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("shape", "rows", "taken"),
+    [
+        ((3, 5), None, "queries"),
+        ((5, 3), None, "references"),
+        ((3, 5), "queries", "queries"),
+        ((5, 3), "references", "references"),
+        ((4, 4), None, "queries"),
+        ((4, 4), "references", "references"),
+    ],
+)
+def test_what_the_rows_are_is_asked_or_told_by_the_shape(
+    shape: tuple[int, int], rows: str | None, taken: str
+) -> None:
+    right = np.random.default_rng(0).random(shape) < 0.5
+    n_queries, n_items = shape if taken == "queries" else shape[::-1]
+    found = truth.by_matrix(right, n_queries, n_items, rows)  # type: ignore[arg-type]
+    assert (found.right == (right if taken == "queries" else right.T)).all()
+    assert found.rule["rows"] == taken
+
+
+@pytest.mark.parametrize(
     ("matrix", "words"),
     [(np.zeros(3), "shape"), (np.full((2, 3), 0.5), "0 and 1"), (np.full((2, 3), np.nan), "0 and 1")],
 )
@@ -135,5 +156,7 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_no_overlap_says_both_spans() -> None:
     track = Track.local([0, 1_000_000], [[0, 0], [1, 1]])
     assert truth.positions_at([500_000, 9_000_000], track).known.tolist() == [True, False]
-    with pytest.raises(EvaluationError, match=r"span 5\.000 to 6\.000 s, the track 0\.000 to 1\.000 s"):
+    with pytest.raises(
+        EvaluationError, match=r"track runs from 0\.000 s to 1\.000 s, the images from 5\.000 s to 6"
+    ):
         truth.positions_at([5_000_000, 6_000_000], track)

@@ -15,8 +15,13 @@ Show = Callable[[int, int, str], None]
 """Moves a progress bar: (done, total, remark)."""
 ARGUMENT = re.compile(r"`([a-z]\w*)(?:=([^`]*))?`")
 """An argument as the library's texts name it: see `evplace.core.errors`."""
-FLAGS = {"listing": "list", "offset_us": "track_offset"}
+FLAGS = {
+    "listing": "list", "offset_us": "track_offset", "date": "track_date", "keep": "track_keep",
+    "max_speed_mps": "track_max_speed",
+}  # fmt: skip
 """Argument of the library -> field of Args, where their names differ."""
+OF_TRACK = re.compile(r"`open_track\((\w+)=([^)`]*)\)`")
+"""A setting of a track's format as the library's texts name it."""
 USED_GOOD_PART = 3
 """Exit code where a recording is damaged and its good part was used."""
 
@@ -27,11 +32,13 @@ def in_flags(text: str) -> str:
     What no terminal shows, such as codes in a file's names, is escaped.
     """
     shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
-    return ARGUMENT.sub(_flag, shown)
+    return ARGUMENT.sub(_flag, OF_TRACK.sub(r"--track-set \1=\2", shown))
 
 
 def _flag(argument: re.Match[str]) -> str:
     name, value = FLAGS.get(argument[1], argument[1]).replace("_", "-"), argument[2]
+    if argument[1] == "offset_us" and value is not None:
+        value = f"{int(value) / 1e6:.6f}".rstrip("0").rstrip(".")  # the flag takes seconds
     if value in (None, "True"):
         return f"--{name}"
     return f"--no-{name}" if value == "False" else f"--{name} {value}"

@@ -79,7 +79,7 @@ def run(args: Args) -> int:
     else:
         print("\n".join(_lines(found)))
     if found.fault is not None:
-        note(f"{found.fault}; what came before it was examined")
+        note(f"{found.fault}; the good part was examined")
     return USED_GOOD_PART if found.fault is not None else 0
 
 

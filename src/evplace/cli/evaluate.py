@@ -37,6 +37,11 @@ SHOWN = (
     "recall_accepted", "average_precision", "recall_at_full_precision", "recall@1", "recall@5", "recall@10",
     "recall@20", "chance", "gallery_spacing_m", "delay_images",
 )  # fmt: skip
+ROWS: dict[str, Literal["queries", "references"]] = {
+    "query-reference": "queries",
+    "reference-query": "references",
+}
+"""Layout -> what the rows of a matrix are."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,9 @@ class Args(TrackFlags, RecordingFlags):
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The result folder to write."""
     truth: Path | None = None
-    """A .npy matrix of 0 and 1, rows = queries, columns = map items, in place of positions."""
+    """A .npy matrix of 0 and 1, queries and map items, in place of positions."""
+    layout: Literal["query-reference", "reference-query"] | None = None
+    """What the rows and the columns of --truth are; by default what fits its shape."""
     frames: int | None = None
     """Query and map are in step: how many items off an answer may be, in place of positions."""
     rule: Literal["places", "view", "radius"] = "places"
@@ -87,6 +94,8 @@ def run(args: Args) -> int:
     check_new_folder(args.out, args.overwrite, MARK)
     if args.truth is not None and args.frames is not None:
         raise SettingsError("--truth and --frames both say what is right: give one of them")
+    if args.layout is not None and args.truth is None:
+        raise SettingsError("--layout says what the rows of --truth are: give both")
     if args.frames is not None and args.frames < 0:
         raise SettingsError(f"--frames is how many items off an answer may be, 0 or more, not {args.frames}")
     place_map = PlaceMap.load(args.map)
@@ -105,7 +114,7 @@ def run(args: Args) -> int:
         print_facts(f"{args.out}: {TIMINGS[args.answers]}", shown)
     note_guesses(query.info.get("notes"))
     if query.info.get("fault"):
-        note(f"{query.info['fault']}; what came before it was measured")
+        note(f"{query.info['fault']}; the good part was measured")
         return USED_GOOD_PART
     return 0
 
@@ -121,7 +130,17 @@ def _opened(args: Args, place_map: PlaceMap) -> Traverse:
 
 def _truth(args: Args, place_map: PlaceMap, query: Traverse) -> Truth | None:
     if args.truth is not None:
-        return by_matrix(args.truth, len(query), len(place_map.items))
+        return _by_matrix(args, args.truth, len(query), len(place_map.items))
     if args.frames is not None:
         return by_frames(len(query), len(place_map.items), args.frames)
     return None
+
+
+def _by_matrix(args: Args, path: Path, n_queries: int, n_items: int) -> Truth:
+    """The truth of a matrix; what its rows are is told where the flag does not say it."""
+    truth = by_matrix(path, n_queries, n_items, ROWS[args.layout] if args.layout else None)
+    if args.layout is None and n_queries == n_items:
+        note(f"the rows of {path} are taken for queries: --layout reference-query for the other way round")
+    elif args.layout is None and truth.rule["rows"] == "references":
+        note(f"the rows of {path} are taken for map items, as its shape fits so")
+    return truth

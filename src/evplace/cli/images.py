@@ -105,7 +105,7 @@ def run(args: Args) -> int:
         print_facts(str(args.out), facts)
     note_guesses(traverse.info.get("notes"))
     if fault is not None:
-        note(f"{fault}; the images before it were written")
+        note(f"{fault}; the good part was written")
     return USED_GOOD_PART if fault is not None else 0
 
 

@@ -135,7 +135,7 @@ def run(args: Args) -> int:
         for match in matches:
             writer.writerow(_row(match))
     if matches.fault is not None:
-        note(f"{matches.fault}; what came before it was localised")
+        note(f"{matches.fault}; the good part was localised")
     return USED_GOOD_PART if matches.fault is not None else 0
 
 

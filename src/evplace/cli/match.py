@@ -5,8 +5,9 @@ Examples:
   evplace match scores.npy --matcher graph --set K=5 --set alpha=0.3 --set m=2.6 -o matches.csv
   evplace match distances.npy --distances --matcher seqslam --preset openseqslam2 -o matches.csv
 
-The matrix has queries as rows and references as columns, in the order of their drives. The csv has
-query,reference,score,accepted; both count from 0, and the reference is -1 where there is none.
+The matrix has queries as rows and references as columns, unless --layout reference-query; both in the order
+of their drives. The csv has query,reference,score,accepted; both count from 0, and the reference is -1 where
+there is none.
 """
 
 from __future__ import annotations
@@ -14,12 +15,15 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import tyro
 
+from evplace.cli._output import note
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
-from evplace.matchers import _files, open_matcher
+from evplace.core import families
+from evplace.matchers import Matcher, _files
+from evplace.matchers._look import ScoreLook
 
 
 @dataclass(frozen=True)
@@ -29,7 +33,7 @@ class Args(SettingsFlags):
     PARTS: ClassVar[tuple[Part, ...]] = (Part.of("matchers", "matcher", preset="preset"),)
 
     scores: tyro.conf.Positional[Path]
-    """A .npy file, (queries, references); larger is better, unless --distances."""
+    """A .npy file; larger is better, unless --distances."""
     output: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The csv file to write."""
     matcher: Annotated[str, a_part_of("matchers")] = "local"
@@ -38,6 +42,8 @@ class Args(SettingsFlags):
     """A preset of the matcher."""
     set: Pairs = ()
     """A setting of the matcher over those of the preset, as name=value."""
+    layout: Literal["query-reference", "reference-query"] | None = None
+    """What its rows and columns are; query-reference unless given."""
     distances: bool = False
     """Smaller is better."""
     overwrite: bool = False
@@ -48,14 +54,24 @@ class Args(SettingsFlags):
 
 def run(args: Args) -> int:
     """Match the whole matrix, a block of rows at a time; 0, or an EvplaceError."""
-    matcher = open_matcher(args.matcher, args.preset, args.distances, **dict(args.set))
+    part: Matcher = families.make("matchers", args.matcher, args.preset, dict(args.set))
+    matcher = part.start(args.distances)
     table = _files.open_scores(args.scores)
+    if args.layout == "reference-query":
+        table = table.T
+    look = ScoreLook(args.distances)
     for rows in _files.score_blocks(table, args.distances):
+        look.see(rows)
         matcher.extend(rows)
     matches = matcher.path()
+    remarks = look.remarks(part, matches)
     _files.write_matches(args.output, matches, args.overwrite)
     queries, references = table.shape
     figures = {"queries": queries, "references": references, "accepted": int(matches.accepted.sum())}
+    if args.layout is None:
+        note("rows are taken for queries, columns for references: --layout reference-query turns them")
+    for remark in remarks:
+        note(remark)
     if args.json:
         print(json.dumps(figures))
     else:

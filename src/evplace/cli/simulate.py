@@ -14,11 +14,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
 
 import tyro
 
-from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json, remarks
+from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_preset_of
 from evplace.core import settings as settings_room
 from evplace.core.errors import DamagedRecordingError
@@ -46,6 +46,8 @@ class Args(SettingsFlags):
     """A setting of the sensor over the preset's, as name=value: threshold_on=0.15."""
     fps: float = 30.0
     """Images a second of a folder without times."""
+    time_unit: Literal["s", "ms", "us", "ns"] | None = None
+    """Unit of the images' times, in timestamps.txt or in their names."""
     seed: int = 0
     """Draws the pixels' thresholds and the noise."""
     overwrite: bool = False
@@ -58,7 +60,7 @@ def run(args: Args) -> int:
     """Simulate and write."""
     preset = settings_room.preset_of("the sensor", PRESETS, args.preset)
     sensor = settings_room.make(SensorSettings, dict(args.set), preset)
-    film = open_film(args.film, args.fps)
+    film = open_film(args.film, args.fps, args.time_unit)
     packets = _Counted(simulate(film, film.size, sensor, args.seed))
     fault = None
     with remarks():
@@ -66,6 +68,7 @@ def run(args: Args) -> int:
             write_recording(args.out, packets, film.size, overwrite=args.overwrite)
         except DamagedRecordingError as error:
             fault = str(error)
+    note_guesses(film.notes)
     events = packets.events
     facts = {
         "events": events,
@@ -79,7 +82,7 @@ def run(args: Args) -> int:
     else:
         print_facts(str(args.out), {"events": events, "sensor": f"{film.size[0]} x {film.size[1]}"})
     if fault is not None:
-        note(f"{fault}; the images before it were simulated")
+        note(f"{fault}; the good part was simulated")
     return USED_GOOD_PART if fault is not None else 0
 
 

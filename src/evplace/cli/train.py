@@ -106,7 +106,7 @@ def run(args: Args) -> int:
     print_json(facts) if args.json else print_facts(str(args.out), facts)
     note_guesses(reference.info.get("notes"))
     if reference.info.get("fault"):
-        note(f"{reference.info['fault']}; what came before it was learned")
+        note(f"{reference.info['fault']}; the good part was learned")
         return USED_GOOD_PART
     return 0
 

@@ -12,6 +12,7 @@ EvplaceError
 │   ├── TrackError           a GPS log or positions
 │   ├── DatasetError        a folder of a data set: of no known layout, or a part of it is missing
 │   ├── TraverseError        a traverse folder, or images and times that do not fit
+│   │   └── UnreadableImageError    one image file is damaged: the others can be used
 │   ├── PlaceMapError        a map: wrong checksum, made with other settings, not a map
 │   ├── ScoresError          score rows that a matcher cannot use
 │   └── EvaluationError      truth and answers that do not fit
@@ -77,6 +78,10 @@ class DatasetError(InputError):
 
 class TraverseError(InputError):
     """A traverse folder, or images and times, cannot be used."""
+
+
+class UnreadableImageError(TraverseError):
+    """One image file is damaged: it can be left out."""
 
 
 class PlaceMapError(InputError):

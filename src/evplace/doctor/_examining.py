@@ -12,7 +12,7 @@ from evplace.core.errors import DamagedRecordingError, InputError, TrackError
 from evplace.core.events import Events, Size
 from evplace.doctor._outcome import STATES, Examination, Finding, Outcome
 from evplace.doctor._subject import Subject
-from evplace.drives.to_traverse import open_source
+from evplace.drives.to_traverse import on_its_day, open_source
 from evplace.imaging.windows import WindowSettings
 from evplace.sources.film import Film
 from evplace.sources.simulators.motion import Frame
@@ -52,6 +52,7 @@ def examine(
     given = open_track(track) if isinstance(track, str | Path) else track
     opened = open_source(path, size, time_unit, drive, dataset, fps=fps, stream=stream, columns=columns)
     positions, recording = _known(opened.track if given is None else given), opened.source
+    positions = on_its_day(positions, recording)
     if isinstance(recording, Film):
         return _film(recording, windows, positions)
     return _examined(Subject(recording.path, "events", recording.size, windows, positions, recording))
@@ -84,7 +85,7 @@ def _examined(subject: Subject, film: Film | None = None) -> Examination:
         _facts(subject),
         tuple(sorted(findings, key=lambda finding: STATES.index(finding.state))),
         tuple(drawing for outcome in outcomes for drawing in outcome.drawings),
-        subject.fault,
+        subject.fault or (subject.track.fault if subject.track is not None else None),
     )
 
 

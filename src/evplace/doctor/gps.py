@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from evplace.doctor._outcome import Finding, Outcome, State, counted
 from evplace.doctor._subject import AtTheEnd, Subject, mean_around
 from evplace.sources.tracks import Track
+from evplace.sources.tracks._apart import apart
 
 OF = ("events", "frames")
 
@@ -15,17 +16,18 @@ LEAP_M = 20.0
 """A shorter step is no jump: noise, or one cell of the map."""
 AROUND = 5
 """Steps before and after by which a step is judged."""
+UNSEEN = "A slow drift of the positions leaves no trace in a log: it is not checked."
 
 
 class Check(AtTheEnd):
     """Asks the track."""
 
     def outcome(self) -> Outcome:
-        """Findings: GPS fixes, quality, gaps, jumps, coverage; none without a track."""
+        """Findings: GPS fixes, the log, gaps, jumps, coverage; none without a track."""
         track = self._subject.track
         if track is None:
             return Outcome()
-        findings = [_quality(track)]
+        findings = [_quality(track), *_log(track)]
         if len(track) < 2:
             return Outcome([*findings, _covered(self._subject, track)])
         findings += [_gaps(track), _jumps(track), _repeated(track), _covered(self._subject, track)]
@@ -41,13 +43,27 @@ def _quality(track: Track) -> Finding:
         advice = "give the log of the whole drive"
         return Finding("GPS fixes", "bad", share, "% unusable", f"{sentence}: that makes no track.", advice)
     if not lost:
-        return Finding("GPS fixes", "good", 0.0, "% unusable", f"{sentence}; all can be used.")
+        return Finding("GPS fixes", "good", 0.0, "% unusable", f"{sentence}; all can be used. {UNSEEN}")
     reasons = ", ".join(f"{number:,} {reason}" for reason, number in track.dropped.items())
     state: State = "good" if share < 1 else "look" if share < 20 else "bad"
     advice = (
         "" if state == "good" else "keep the receiver in the open and wait for its fix before driving off"
     )
-    return Finding("GPS fixes", state, share, "% unusable", f"{sentence}; left out: {reasons}.", advice)
+    return Finding(
+        "GPS fixes", state, share, "% unusable", f"{sentence}; left out: {reasons}. {UNSEEN}", advice
+    )
+
+
+def _log(track: Track) -> list[Finding]:
+    """What was guessed, left out and broken off in the log, with its examples."""
+    if track.fault is not None:
+        sentence = ". ".join([f"The log is damaged: {track.fault}", *track.notes])
+        advice = "copy the log anew: the track ends where it breaks off"
+        return [Finding("GPS log", "bad", len(track.notes), "remarks", f"{sentence}.", advice)]
+    if not track.notes:
+        return []
+    sentence = ". ".join(note[0].upper() + note[1:] for note in track.notes)
+    return [Finding("GPS log", "look", len(track.notes), "remarks", f"{sentence}.", "see that this is so")]
 
 
 def _gaps(track: Track) -> Finding:
@@ -111,13 +127,9 @@ def _covered(subject: Subject, track: Track) -> Finding:
         )
     share = 100 * float(track.at(t_us).known.mean())
     if track.t_us[-1] < subject.t_first_us or track.t_us[0] > subject.t_last_us:
-        return Finding(
-            "GPS coverage", "bad", 0.0, "%",
-            f"The track and the recording do not overlap: the track runs from {track.t_us[0] / 1e6:.3f} s to "
-            f"{track.t_us[-1] / 1e6:.3f} s, the recording from {subject.t_first_us / 1e6:.3f} s to "
-            f"{subject.t_last_us / 1e6:.3f} s.",
-            "give the recording's own track, or shift its times with `offset_us`",
-        )  # fmt: skip
+        why = apart(track, subject.t_first_us, subject.t_last_us)
+        sentence = why.sentence[0].upper() + why.sentence[1:]
+        return Finding("GPS coverage", "bad", 0.0, "%", f"{sentence}.", why.advice)
     state: State = "good" if share >= 95 else "look" if share >= 50 else "bad"
     sentence = f"{share:.1f} % of the recording has a position."
     advice = "" if state == "good" else "images without a position are left out of the truth: see GPS gaps"

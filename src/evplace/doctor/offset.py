@@ -44,6 +44,8 @@ MODEL_S = 0.3
 whose clocks agree, give 0.2 s. It is added to the bootstrap's uncertainty, by squares."""
 VAGUE_S = 3.0
 """Uncertainty above which no offset is given: it would not say which place is which."""
+LEAP_S = 18.0
+"""Leap seconds since 1980, by which GPS time is ahead of UTC."""
 HARMLESS_S = 0.5
 """An offset below this, or below its uncertainty, costs a few metres at most."""
 
@@ -189,6 +191,8 @@ def _finding(offset: Offset) -> Finding:
         f"The track fits best with {offset.seconds:+.2f} s added to its times, give or take "
         f"{offset.uncertainty_s:.2f} s (95 %; correlation {offset.fit:.2f})."
     )
+    if abs(abs(offset.seconds) - LEAP_S) <= offset.uncertainty_s:
+        sentence += f" GPS time is {LEAP_S:.0f} s, the leap seconds, ahead of UTC: that may be why."
     away = abs(offset.seconds)
     if away <= max(HARMLESS_S, offset.uncertainty_s):
         return Finding("clock offset", "good", offset.seconds, "s", sentence)

@@ -34,6 +34,7 @@ from evplace.sources.frames import is_frames, open_frames
 from evplace.sources.readers import Recording, is_recording, open_recording
 from evplace.sources.simulators.recording import SimulatedRecording
 from evplace.sources.tracks import Track, open_track
+from evplace.sources.tracks._apart import apart, on_day_of
 
 T = TypeVar("T")
 
@@ -107,26 +108,29 @@ def open_source(
 ) -> Drive:
     """What `path` holds, as a drive: see `open_traverse`; `listing` and `fps` as in `open_frames`.
 
-    A folder is a data set where it has the layout of one, whatever else lies in it. `size`, `time_unit`,
-    `stream` and `columns` are for a recording, `drive` and `dataset` for a data set's folder, `listing` and
-    `fps` for a folder of images; SettingsError where one is given that has no meaning for what `path` is.
+    A folder is a data set where it has the layout of one, whatever else lies in it. `size`, `stream` and
+    `columns` are for a recording, `time_unit` for one or for images with times, `drive` and `dataset` for a
+    data set's folder, `listing` and `fps` for a folder of images; SettingsError where one is given that has
+    no meaning for what `path` is.
     """
     place = Path(path)
-    of_recordings: dict[str, object] = {
-        "size": size, "time_unit": time_unit, "stream": stream, "columns": columns,
-    }  # fmt: skip
+    of_recordings: dict[str, object] = {"size": size, "stream": stream, "columns": columns}
     of_images: dict[str, object] = {"listing": listing, "fps": fps}
+    of_any = of_recordings | of_images | {"time_unit": time_unit}
     is_folder = place.is_dir() and not is_recording(place)
     if drive is not None or dataset is not None or (is_folder and datasets.matching(place)):
-        _refuse(f"{place} is a data set, which has its own size, times and order", of_recordings | of_images)
+        _refuse(
+            f"{place} is a data set, which has its own size, times and order",
+            of_any,
+        )
         return datasets.open_drive(place, drive, dataset)
     if is_video(place):
-        _refuse(f"{place} is a video, which has its own size and times", of_recordings | of_images)
+        _refuse(f"{place} is a video, which has its own size and times", of_any)
         return Drive(open_film(place), simulate=True)
     for images in (place, place / "images") if is_folder else ():
         if is_frames(images):
             _refuse(f"{images} holds images, which have their own size", of_recordings)
-            return Drive(_listed_film(images, listing, fps))
+            return Drive(_listed_film(images, listing, fps, time_unit))
     _refuse(f"{place} is no folder of images", of_images)
     return Drive(_recording(place, size, time_unit, stream, columns))
 
@@ -148,7 +152,7 @@ def record(
     asked = (recipe or drive.recipe).changed(**settings)
     source = recorded_as(asked.kind, drive)
     _check_meant(source, settings)
-    positions = drive.track if track is None else _opened(track)
+    positions = on_its_day(drive.track if track is None else _opened(track), drive.source)
     mask = drive.mask if mask is None else mask
     if isinstance(source, Film):
         check_uncleaned(source.path, asked, mask)
@@ -182,15 +186,13 @@ def _record_events(
     writer.info |= {
         "source": str(recording.path),
         "spacing": to_dict(spacer.settings),
-        "notes": recording.notes,
         "dropped": recording.dropped,
         "cleaned": stream.cleaned,
         "left_out": spacer.left_out,
-        "fault": packets.fault,
-    }
+    } | _remarks(track, {"notes": recording.notes, "fault": packets.fault})
     if isinstance(recording, SimulatedRecording):
         writer.info["simulated"] = to_dict(recording.sensor) | {"seed": recording.seed}
-    return packets.fault
+    return _fault(writer)
 
 
 def _record_frames(
@@ -199,7 +201,7 @@ def _record_frames(
     """Write camera images, cropped and resized as the recipe says; returns what broke off, as above."""
     shape, frames, overlap = None, _GoodPart(film.images()), _Overlap(track)
     spacer = Spacer(spacing, track)
-    for n, (t_us, frame) in enumerate(frames):
+    for t_us, frame in frames:
         if shape is None:
             shape = frame.shape
             writer.recipe = dataclasses.replace(asked, kind="frames", size=(shape[1], shape[0]))
@@ -208,7 +210,7 @@ def _record_frames(
             )
         if frame.shape != shape:
             raise TraverseError(
-                f"{film.name(n)} is {frame.shape}, the images before it are {shape}: make them alike"
+                f"{film.name(t_us)} is {frame.shape}, the images before it are {shape}: make them alike"
             )
         overlap.see(t_us)
         if spacer.keeps(t_us, -1):
@@ -220,9 +222,8 @@ def _record_frames(
         "timed": film.timed,
         "spacing": to_dict(spacer.settings),
         "left_out": spacer.left_out,
-        "fault": frames.fault,
-    }
-    return frames.fault
+    } | _remarks(track, {"notes": film.notes, "fault": frames.fault})
+    return _fault(writer)
 
 
 def open_source_for(
@@ -260,8 +261,11 @@ def _opened_again(
         found.recipe.require_same(recipe, f"the traverse {path}", "the recipe asked for", again)
     if settings:
         _check_made_so(path, found.recipe, settings, again)
-    aligned = _aligned(track, found.t_us)
-    return found if aligned is None else dataclasses.replace(found, track=aligned)
+    positions = None if track is None else on_day_of(track, int(found.t_us[0]))
+    aligned = _aligned(positions, found.t_us)
+    if aligned is None:
+        return found
+    return dataclasses.replace(found, track=aligned, info=found.info | _remarks(positions, found.info))
 
 
 def _other_spacing(found: Traverse, asked: object) -> object:
@@ -311,8 +315,9 @@ def _refuse(what: str, arguments: Mapping[str, object]) -> None:
         raise SettingsError(f"{what}: leave out {' and '.join(said)}")
 
 
-def _listed_film(folder: Path, listing: str | Path | None, fps: float | None) -> Film:
-    frames = open_frames(folder, listing) if fps is None else open_frames(folder, listing, fps)
+def _listed_film(folder: Path, listing: str | Path | None, fps: float | None, time_unit: str | None) -> Film:
+    rate = 30.0 if fps is None else fps
+    frames = open_frames(folder, listing, rate, time_unit)
     if frames.timed:
         _refuse(f"the images in {folder} have times of their own", {"fps": fps})
     return film_of(folder, frames)
@@ -360,15 +365,32 @@ def _aligned(track: Track | None, t_us: NDArray[np.int64]) -> Track | None:
         return None
     aligned = track.at(t_us)
     if not aligned.known.any():
-        raise _apart(track, f"run from {_seconds(t_us)}")
+        raise TrackError(str(apart(track, int(t_us[0]), int(t_us[-1]))))
     return aligned
 
 
-def _apart(track: Track, images: str) -> TrackError:
-    return TrackError(
-        f"the track and the images do not overlap: the track runs from {_seconds(track.t_us)}, the images "
-        f"{images}; give the recording's own track, or shift the track's times with `offset_us`"
-    )
+def on_its_day(track: Track | None, source: Recording | Film) -> Track | None:
+    """A track without dates takes that of the recording."""
+    if track is None or track.dated:
+        return track
+    if isinstance(source, Film):
+        first_us = next((t_us for t_us, _ in source.images()), None)
+    else:
+        first_us = next((int(events.t_us[0]) for events in source.packets() if len(events)), None)
+    return track if first_us is None else on_day_of(track, first_us)
+
+
+def _fault(writer: TraverseWriter) -> str | None:
+    fault: str | None = writer.info["fault"]
+    return fault
+
+
+def _remarks(track: Track | None, info: Mapping[str, Any]) -> dict[str, Any]:
+    """What was guessed and what broke off, of the recording and of its track."""
+    notes, fault = info.get("notes") or [], info.get("fault")
+    if track is None:
+        return {"notes": notes, "fault": fault}
+    return {"notes": [*notes, *track.notes], "fault": fault or track.fault}
 
 
 class _Overlap:
@@ -383,17 +405,13 @@ class _Overlap:
         if self._track is None:
             return
         if self._seen is None and t_us > self._track.t_us[-1]:
-            raise _apart(self._track, f"begin at {t_us / 1e6:.3f} s")
+            raise TrackError(str(apart(self._track, t_us, t_us)))
         self._seen = (self._seen or (t_us, t_us))[0], t_us
 
     def check(self) -> None:
         """After the last image; TrackError where it came before the track's begin."""
         if self._track is not None and self._seen is not None and self._seen[1] < self._track.t_us[0]:
-            raise _apart(self._track, f"run from {_seconds(np.array(self._seen))}")
-
-
-def _seconds(t_us: NDArray[np.int64]) -> str:
-    return f"{t_us[0] / 1e6:.3f} s to {t_us[-1] / 1e6:.3f} s"
+            raise TrackError(str(apart(self._track, *self._seen)))
 
 
 class _GoodPart(Generic[T]):

@@ -23,6 +23,7 @@ from evplace.core.errors import EvaluationError, InputError
 from evplace.core.storage import read_array
 from evplace.places import Places
 from evplace.sources.tracks import Track
+from evplace.sources.tracks._apart import apart
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -92,10 +93,7 @@ def positions_at(t_us: ArrayLike, track: Track, max_gap_s: float = 1.0, max_gap_
     times = np.asarray(t_us, np.int64)
     found = track.at(times, max_gap_s, max_gap_m)
     if not found.known.any():
-        raise EvaluationError(
-            f"no query has a position: the queries span {_span(times)}, the track {_span(track.t_us)}: "
-            "give the track of this drive, or shift its times with `offset_us`"
-        )
+        raise EvaluationError(f"no query has a position: {_why(times, track)}")
     return found
 
 
@@ -207,14 +205,18 @@ def by_matrix(
     given: str | Path | ArrayLike,
     n_queries: int,
     n_items: int,
-    rows: Literal["queries", "references"] = "queries",
+    rows: Literal["queries", "references"] | None = "queries",
 ) -> Truth:
     """A matrix of 0 and 1, or a .npy file of one; `rows` says what its rows are.
 
-    Raises EvaluationError where it is not (n_queries, n_items) or holds anything but 0 and 1.
+    None: what fits the shape, queries where both do; the truth's rule says what was taken. Raises
+    EvaluationError where it is not (n_queries, n_items) or holds anything but 0 and 1.
     """
     matrix = _loaded(given) if isinstance(given, str | Path) else np.asarray(given)
     name = str(given) if isinstance(given, str | Path) else "the given truth"
+    if rows is None:
+        turned = matrix.shape == (n_items, n_queries) and n_queries != n_items
+        rows = "references" if turned else "queries"
     if matrix.ndim == 2 and rows == "references":
         matrix = matrix.T
     if matrix.shape != (n_queries, n_items):
@@ -262,7 +264,10 @@ def _check_length(values: NDArray[Any], wanted: int, what: str) -> None:
         raise EvaluationError(f"{len(values)} {what} do not fit {wanted} queries")
 
 
-def _span(t_us: NDArray[np.int64]) -> str:
+def _why(t_us: NDArray[np.int64], track: Track) -> str:
     if not len(t_us):
-        return "no time at all"
-    return f"{t_us.min() / 1e6:.3f} to {t_us.max() / 1e6:.3f} s"
+        return "there is no query"
+    first, last = int(t_us.min()), int(t_us.max())
+    if last < track.t_us[0] or first > track.t_us[-1]:
+        return str(apart(track, first, last))
+    return "its fixes are too far apart in time or space for the times of the queries"

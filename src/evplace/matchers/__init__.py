@@ -82,7 +82,8 @@ class Matching(Protocol):
 class Matcher(Protocol):
     """A way to match, with its settings: a frozen dataclass, such as `matchers.Local(K=5)`.
 
-    A class may have `presets`, a mapping of names to objects of it.
+    A class may have `presets`, a mapping of names to objects of it, and say `of_similarities = True` where it
+    takes scores above 0 alone.
     """
 
     causal: ClassVar[bool]

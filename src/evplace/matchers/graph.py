@@ -57,6 +57,8 @@ class Graph:
 
     presets: ClassVar[Mapping[str, Graph]]
     causal: ClassVar[bool] = False
+    of_similarities: ClassVar[bool] = True
+    """Costs are 1/similarity: scores above 0, where they are no distances."""
 
     def start(self, distances: bool = False) -> Matching:
         """See Matcher."""

@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import DamagedRecordingError, InputError, MissingExtraError
+from evplace.core.errors import (
+    DamagedRecordingError,
+    InputError,
+    MissingExtraError,
+    SettingsError,
+    UnreadableImageError,
+)
 from evplace.core.events import Size
 from evplace.core.grey import to_grey
 from evplace.sources.frames import Frames, is_frames, open_frames
@@ -41,9 +47,16 @@ class Film:
         """Whether the times are the camera's, not made up from a rate."""
         return self.frames is None or self.frames.timed
 
-    def name(self, n: int) -> str:
-        """What image `n` is called in errors."""
-        return f"image {n} of {self.path}" if self.frames is None else str(self.frames.files[n])
+    @property
+    def notes(self) -> list[str]:
+        """What was guessed of the times."""
+        return [] if self.frames is None else list(self.frames.notes)
+
+    def name(self, t_us: int) -> str:
+        """What the image at that time is called in errors."""
+        if self.frames is None:
+            return f"the image at {t_us / 1e6:.3f} s of {self.path}"
+        return str(self.frames.files[int(np.searchsorted(self.frames.t_us, t_us))])
 
     def __iter__(self) -> Iterator[tuple[int, Grey]]:
         """Each image in grey: microseconds, uint8 (H, W); errors as `images`."""
@@ -54,29 +67,33 @@ class Film:
     def images(self) -> Iterator[tuple[int, NDArray[np.uint8]]]:
         """Each image as it is: microseconds, uint8 (H, W), or (H, W, 3) where it has colours.
 
-        InputError where the first cannot be decoded; DamagedRecordingError after the last good one where
-        a later one cannot be, does not come after the one before it, or is missing at the end of a video.
+        A damaged image on disk is left out: DamagedRecordingError at the end says how many. Of a video the
+        same after the last good image, where a later one cannot be decoded, does not come after the one
+        before it, or is missing at the end. InputError where no image can be decoded.
         """
         return _video(self.path, "rgb24") if self.frames is None else _on_disk(self.frames)
 
 
-def open_film(path: str | Path, fps: float = 30.0) -> Film:
-    """A video file, or a folder of images with or without timestamps.txt (seconds).
+def open_film(path: str | Path, fps: float = 30.0, time_unit: str | None = None) -> Film:
+    """A video file, or a folder of images with or without times, as `open_frames`.
 
-    `fps` is for a folder without times. Raises InputError where it cannot be decoded, its times do not
-    increase or it holds no image; MissingExtraError where a video needs the package av.
+    `fps` is for a folder without times, `time_unit` for one with. Raises InputError where it cannot be
+    decoded, its times do not increase or it holds no image; MissingExtraError where a video needs the package
+    av.
     """
     film = Path(path)
     if not film.exists():
         raise InputError(f"there is no video or folder of images {film}")
     if not film.is_dir():
+        if time_unit is not None:
+            raise SettingsError(f"{film} is a video, which has its own times: leave out time_unit")
         return _sized(Film(film, (0, 0), None))
     if not is_frames(film):
         inner = film / "images"
         if not (inner.is_dir() and is_frames(inner)):
             raise InputError(f"{film} holds no images: give a video, or a folder of images")
         film = inner
-    return film_of(film, open_frames(film, fps=fps))
+    return film_of(film, open_frames(film, fps=fps, time_unit=time_unit))
 
 
 def film_of(path: Path, frames: Frames) -> Film:
@@ -96,14 +113,23 @@ def _sized(film: Film) -> Film:
 
 
 def _on_disk(frames: Frames) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    lost: list[str] = []
     for n, (t_us, file) in enumerate(zip(frames.t_us.tolist(), frames.files, strict=True)):
         try:
             image = frames.read(file)
+        except UnreadableImageError as error:
+            lost.append(str(error))
+            continue
         except InputError as error:
             if n == 0:
                 raise
             raise DamagedRecordingError(str(error)) from error
         yield t_us, image
+    if len(lost) == len(frames):
+        raise InputError(lost[0] if len(lost) == 1 else f"none of {len(lost)} images can be read: {lost[0]}")
+    if lost:
+        what = f"{len(lost)} of {len(frames)} images cannot be read and are left out"
+        raise DamagedRecordingError(f"{what}, the first: {lost[0]}")
 
 
 def _video(path: Path, pixels: str) -> Iterator[tuple[int, NDArray[np.uint8]]]:

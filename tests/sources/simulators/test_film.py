@@ -150,13 +150,25 @@ def test_a_video_that_was_cut_off(tmp_path: Path, suffix: str) -> None:
     assert 10 < len(good) < 50
 
 
-def test_a_broken_image_ends_the_good_part(tmp_path: Path) -> None:
+@pytest.mark.parametrize("bad", [[2], [0], [3], [0, 2], [1, 2, 3]])
+def test_broken_images_are_left_out_and_counted(tmp_path: Path, bad: list[int]) -> None:
     film = open_film(write_images(tmp_path / "film", 4))
-    (tmp_path / "film" / "frame_0002.png").write_bytes(b"no image")
+    for number in bad:
+        (tmp_path / "film" / f"frame_{number:04d}.png").write_bytes(b"no image")
     good = []
-    with pytest.raises(DamagedRecordingError, match=r"frame_0002\.png"):
-        good.extend(film.images())
-    assert len(good) == 2
+    told = rf"^{len(bad)} of 4 images cannot be read and are left out, the first: .*frame_{bad[0]:04d}\.png"
+    with pytest.raises(DamagedRecordingError, match=told):
+        good.extend(t_us for t_us, _ in film.images())
+    times = film.frames.t_us.tolist() if film.frames is not None else []
+    assert good == [t_us for number, t_us in enumerate(times) if number not in bad]
+    assert len(open_film(tmp_path / "film").size) == 2
+
+
+def test_images_of_which_none_can_be_read(tmp_path: Path) -> None:
+    for number in range(3):
+        (tmp_path / f"{number}.png").write_bytes(b"no image")
+    with pytest.raises(InputError, match=r"none of 3 images can be read: .*0\.png"):
+        open_film(tmp_path)
 
 
 def test_frames_of_one_time_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

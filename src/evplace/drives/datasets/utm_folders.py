@@ -32,7 +32,7 @@ from evplace.imaging.images import ImageSettings
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import Traverse
 from evplace.sources.film import film_of
-from evplace.sources.frames import SUFFIXES, Frames, read_image
+from evplace.sources.frames import Frames, is_image, read_image
 from evplace.sources.tracks import Track
 
 NEEDS = "database/@UTM_east@UTM_north@zone@letter@...@.jpg, and queries/ alike"
@@ -116,7 +116,7 @@ def _images(folder: Path, name: str) -> list[Path]:
     """The images of the first split that has them."""
     for split in SPLITS:
         place = folder / split / name
-        files = [file for file in place.rglob("*") if file.suffix.lower() in SUFFIXES]
+        files = [file for file in place.rglob("*") if is_image(file)]
         if any(file.name.startswith("@") for file in files):
             return sorted(files)
     return []
@@ -124,7 +124,7 @@ def _images(folder: Path, name: str) -> list[Path]:
 
 def _own_images(folder: Path) -> list[Path]:
     """The images of a folder that is itself such a one: its `database`, say."""
-    files = [file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES]
+    files = [file for file in folder.iterdir() if is_image(file)]
     return sorted(files) if any(file.name.startswith("@") for file in files) else []
 
 

@@ -23,8 +23,6 @@ class SimulatedRecording:
     """Draws the pixels' thresholds and the noise."""
     dropped: dict[str, int] = field(default_factory=dict)
     """Nothing is left out."""
-    notes: list[str] = field(default_factory=list)
-    """Nothing is guessed."""
 
     @property
     def path(self) -> Path:
@@ -35,6 +33,11 @@ class SimulatedRecording:
     def size(self) -> Size:
         """(width, height) of the sensor: the film's."""
         return self.film.size
+
+    @property
+    def notes(self) -> list[str]:
+        """What was guessed of the film's times."""
+        return self.film.notes
 
     def packets(self) -> Iterator[Events]:
         """The events from the start, one packet for each image but the first; errors as `simulate`."""

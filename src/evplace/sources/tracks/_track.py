@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from evplace.core.errors import TrackError
-from evplace.sources.tracks._fixes import Fixes, usable
+from evplace.sources.tracks._fixes import Fixes
+from evplace.sources.tracks._order import Keep, in_order
 
 _MIN_SPEED_MPS = 1.0
 """Below this the direction of movement is mostly GPS noise."""
@@ -16,6 +17,10 @@ _MAX_STEP_US = 5_000_000
 """A heading is not taken from fixes further apart than this."""
 _ZONE_REACH_DEG = 15.0
 """How far from a zone's central meridian its metres are still useful."""
+_LATITUDES = (-80.0, 84.0)
+"""UTM is defined between these."""
+MAX_SPEED_MPS = 70.0
+"""No vehicle on a road goes faster."""
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +50,14 @@ class Track:
     """Whether northings count from the equator (else from 10,000 km south of it)."""
     dropped: dict[str, int] = field(default_factory=dict)
     """Reason -> number of fixes that were left out."""
+    notes: tuple[str, ...] = ()
+    """What was guessed or left out, a sentence each, with an example."""
+    fault: str | None = None
+    """What broke the log off; this is its good part."""
+    dated: bool = True
+    """Whether times count from 1970; else from the midnight before the first fix."""
+    unit: str | None = None
+    """The unit that the log's times were taken in, where the log does not say."""
 
     def __len__(self) -> int:
         return len(self.t_us)
@@ -61,27 +74,35 @@ class Track:
 
     @classmethod
     def of(
-        cls, fixes: Fixes, offset_us: int = 0, zone: int | None = None, northern: bool | None = None
+        cls,
+        fixes: Fixes,
+        offset_us: int = 0,
+        zone: int | None = None,
+        northern: bool | None = None,
+        max_speed_mps: float = MAX_SPEED_MPS,
+        keep: Keep | None = None,
     ) -> Track:
-        """The usable fixes in one UTM zone: `zone` and `northern`, or those of the first fix.
+        """The fixes that can be true, in one UTM zone: `zone` and `northern`, or those of the middle fix.
 
-        Raises TrackError where no fix is usable or they lie too far from the zone.
+        One wrong fix does not matter: it is left out, counted and shown. `max_speed_mps` is the fastest that
+        the vehicle goes; `keep` the side that is right where the log's clock was set.
+        Raises TrackError where no fix is usable, or most cannot be true or lie too far from the zone.
         """
-        import utm
+        from evplace.sources.tracks._possible import possible  # compiles: not needed without a log
 
-        good = usable(fixes)
-        latitude, longitude = good.latitude, good.longitude
-        if northern is None:
-            northern = bool(latitude[0] >= 0)
-        if zone is None:
-            zone = int(utm.latlon_to_zone_number(latitude[0], longitude[0]))
-        _check_zone(zone, longitude)
-        easting, northing, _, _ = utm.from_latlon(
-            latitude, longitude, force_zone_number=zone, force_northern=northern
-        )
+        if fixes.xy is None:
+            fixes, zone, northern = _in_zone(_known(fixes), zone, northern)
+        else:
+            fixes, zone, northern = _finite(fixes), 0, True
+        good = possible(in_order(fixes, keep), max_speed_mps)
+        assert good.xy is not None
+        easting, northing = np.ascontiguousarray(good.xy.T)
         heading = _heading(good.t_us, easting, northing, good.heading_deg)
-        t_us = good.t_us + np.int64(offset_us)
-        return cls(t_us, latitude, longitude, easting, northing, heading, zone, northern, good.dropped)
+        notes = (*good.notes, *good.losses.sentences())
+        return cls(
+            good.t_us + np.int64(offset_us), good.latitude, good.longitude, easting, northing, heading, zone,
+            northern, good.losses.counts, notes, good.fault, good.dated, good.unit,
+        )  # fmt: skip
 
     @classmethod
     def local(cls, t_us: ArrayLike, xy: ArrayLike, heading_deg: ArrayLike | None = None) -> Track:
@@ -149,24 +170,64 @@ class Track:
         start, end = np.deg2rad(self.heading_deg[left]), np.deg2rad(self.heading_deg[right])
         east, north = between(np.sin(start), np.sin(end)), between(np.cos(start), np.cos(end))
         heading = np.rad2deg(np.arctan2(east, north)) % 360
-        return Track(
-            times,
-            along(self.latitude),
-            along(self.longitude),
-            along(self.easting),
-            along(self.northing),
-            heading,
-            self.zone,
-            self.northern,
-            self.dropped,
+        return replace(
+            self,
+            t_us=times,
+            latitude=along(self.latitude),
+            longitude=along(self.longitude),
+            easting=along(self.easting),
+            northing=along(self.northing),
+            heading_deg=heading,
         )
+
+
+def _known(fixes: Fixes) -> Fixes:
+    """The fixes with a position on the Earth that UTM covers; TrackError where there is none."""
+    latitude, longitude = fixes.latitude, fixes.longitude
+    finite = np.isfinite(latitude) & np.isfinite(longitude)
+    zero = finite & (latitude == 0) & (longitude == 0)  # what receivers write before a fix
+    inside = (latitude >= _LATITUDES[0]) & (latitude <= _LATITUDES[1]) & (np.abs(longitude) <= 180)
+    fixed = fixes.without(~finite | zero, "no fix")
+    return _some(fixed.without(~inside[finite & ~zero], "out of range"))
+
+
+def _finite(fixes: Fixes) -> Fixes:
+    """The fixes with a position on their plane; TrackError where there is none."""
+    return _some(fixes.without(~np.isfinite(fixes.xy).all(axis=1), "no position"))  # type: ignore[arg-type]
+
+
+def _some(fixes: Fixes) -> Fixes:
+    if not len(fixes):
+        raise TrackError(f"no usable fix{fixes.losses}")
+    return fixes
+
+
+def _in_zone(fixes: Fixes, zone: int | None, northern: bool | None) -> tuple[Fixes, int, bool]:
+    """The fixes with metres in one zone, by default that of the middle one; far ones are counted."""
+    import utm
+
+    middle = float(np.sort(fixes.longitude)[len(fixes) // 2])  # of a fix: a mean of two may be of none
+    if northern is None:
+        northern = bool(np.median(fixes.latitude) >= 0)
+    if zone is None:
+        zone = int(utm.latlon_to_zone_number(float(np.median(fixes.latitude)), middle))
+    _check_zone(zone, np.array([middle]))
+    near = fixes.without(_away(zone, fixes.longitude) > _ZONE_REACH_DEG, "far from all others")
+    easting, northing, _, _ = utm.from_latlon(
+        near.latitude, near.longitude, force_zone_number=zone, force_northern=northern
+    )
+    return replace(near, xy=np.column_stack([easting, northing])), zone, northern
+
+
+def _away(zone: int, longitude: Floats) -> Floats:
+    """Degrees from the middle of a zone."""
+    return np.asarray(np.abs((longitude - (6 * zone - 183) + 180) % 360 - 180), np.float64)
 
 
 def _check_zone(zone: int, longitude: Floats) -> None:
     if not 1 <= zone <= 60:
         raise TrackError(f"there is no UTM zone {zone}: give one from 1 to 60")
-    meridian = 6 * zone - 183
-    away = np.abs((longitude - meridian + 180) % 360 - 180)
+    away = _away(zone, longitude)
     if np.any(away > _ZONE_REACH_DEG):
         raise TrackError(
             f"fixes lie up to {away.max():.0f} degrees from the middle of UTM zone {zone}: "

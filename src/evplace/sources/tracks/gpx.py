@@ -1,24 +1,24 @@
-"""GPX 1.0 and 1.1: the points of all tracks and segments, in the file's order; waypoints are no track."""
+"""GPX 1.0 and 1.1: the points of all tracks and segments, in the file's order; waypoints are no track.
+
+Read point by point, so that a file that is cut off gives the points before the cut.
+"""
 
 from __future__ import annotations
 
 import codecs
-import datetime
+import io
+import math
 import re
-from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, ParseError, iterparse
 
 from evplace.core.errors import TrackError
-from evplace.sources.tracks._fixes import Fix, Fixes
+from evplace.sources._times import iso_us, number
+from evplace.sources.tracks._fixes import Fix, Fixes, Losses, shown
 
-_EPOCH = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC)
 _ENCODING = re.compile(r"""\sencoding=["']([\w.:-]+)["']""")
-_MICROSECOND = datetime.timedelta(microseconds=1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,57 +29,93 @@ class Settings:
 PRESETS: dict[str, Settings] = {}
 
 
+class Point(NamedTuple):
+    """The text of a track point."""
+
+    latitude: str
+    longitude: str
+    time: str
+    speed: str
+
+    def __str__(self) -> str:
+        return shown(f"{self.latitude}, {self.longitude} at {self.time or 'no time'}")
+
+
 def recognises(head: bytes) -> bool:
     """Whether this is XML with a <gpx> element (ASCII-compatible or UTF-16)."""
     return bool(re.search(rb"<(\w+:)?gpx[\s>]", head.replace(b"\x00", b"")))
 
 
 def read(path: Path, settings: Settings) -> Fixes:
-    """All track points that have a time; those without are counted.
+    """All track points that have a time; those without, and damaged ones, are counted.
 
-    Raises TrackError where the file is no sound GPX or no track point has a time.
+    Raises TrackError where the file is no GPX or no track point has a time.
     """
     del settings
-    points = list(_points(_parsed(path)))
-    if not points:
-        raise TrackError("the GPX file has no track point (waypoints and routes have no times to go by)")
-    dropped: Counter[str] = Counter()
+    points, fault = _points(path)
+    losses = Losses()
+
+    def show(line: int) -> str:
+        return f"point {line}: {points[line - 1]}"
+
     fixes = []
-    for point in points:
-        if point.time is None:
-            dropped["no time"] += 1
-        else:
-            fixes.append(Fix(_microseconds(point.time), point.latitude, point.longitude, np.nan))
-    if not fixes:
+    for line, point in enumerate(points, 1):
+        try:
+            if point.time:
+                fixes.append(_fix(point, line))
+            else:
+                losses.add("no time", show(line))
+        except (ValueError, OverflowError):
+            losses.add("damaged point", show(line))
+    if not points:
+        raise TrackError(
+            f"not a sound GPX file: {fault}"
+            if fault
+            else "the GPX file has no track point (waypoints and routes have no times to go by)"
+        )
+    if losses.counts.get("no time") == len(points):
         raise TrackError(f"none of the {len(points)} track points has a time: export the track with times")
-    return Fixes.of(fixes, dict(dropped))
+    return Fixes.of(fixes, show=show, losses=losses, fault=fault and f"{path} breaks off: {fault}")
 
 
-def _parsed(path: Path) -> Any:
-    import gpxpy
-
+def _points(path: Path) -> tuple[list[Point], str | None]:
+    """The track points of the file, and what broke it off."""
+    points: list[Point] = []
     try:
-        return gpxpy.parse(_text(path.read_bytes()))
-    except (gpxpy.gpx.GPXException, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise TrackError(f"not a sound GPX file: {' '.join(str(error).split())}") from error
+        for _, element in iterparse(io.StringIO(_text(path.read_bytes()))):
+            if _name(element) == "trkpt":
+                points.append(_point(element))
+                element.clear()
+    except (ParseError, ValueError, LookupError) as error:
+        return points, " ".join(str(error).split())
+    return points, None
 
 
 def _text(xml: bytes) -> str:
     """The file as text, by its byte order mark, else by the encoding that it declares, else as UTF-8."""
     if xml.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return _ENCODING.sub("", xml.decode("utf-16"), count=1)
+        return _ENCODING.sub("", xml.decode("utf-16", "replace"), count=1)
     declared = _ENCODING.search(xml[:200].decode("ascii", "replace"))
-    plain = xml.removeprefix(codecs.BOM_UTF8).decode(declared[1] if declared else "utf-8")
+    plain = xml.removeprefix(codecs.BOM_UTF8).decode(declared[1] if declared else "utf-8", "replace")
     return _ENCODING.sub("", plain, count=1)
 
 
-def _points(gpx: Any) -> Iterator[Any]:
-    for track in gpx.tracks:
-        for segment in track.segments:
-            yield from segment.points
+def _name(element: Element) -> str:
+    """The name without its namespace."""
+    return element.tag.rpartition("}")[2]
 
 
-def _microseconds(time: datetime.datetime) -> int:
-    """Since 1970; a time without a zone is UTC, as GPX says."""
-    aware = time if time.tzinfo else time.replace(tzinfo=datetime.UTC)
-    return (aware - _EPOCH) // _MICROSECOND
+def _point(element: Element) -> Point:
+    inner = {_name(child): (child.text or "").strip() for child in element.iter()}
+    return Point(
+        element.get("lat", ""), element.get("lon", ""), inner.get("time", ""), inner.get("speed", "")
+    )
+
+
+def _fix(point: Point, line: int) -> Fix:
+    latitude, longitude = float(number(point.latitude)), float(number(point.longitude))
+    try:
+        speed = float(number(point.speed))
+    except ValueError:
+        speed = math.nan
+    return Fix(iso_us(point.time), latitude, longitude, speed=speed, line=line)

@@ -1,0 +1,327 @@
+"""Which fixes can be true: a vehicle goes no faster than so, and goes as its log says that it does.
+
+Wrong fixes are found by what stands around them: where a log jumps away and back, the stretch between is
+left out, whichever it is, so that as many fixes as can be remain. What leaves no trace in a log, a slow
+drift of the positions for example, cannot be found.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from evplace.core.errors import TrackError
+from evplace.sources._times import DATED_US
+from evplace.sources.tracks._fixes import Bools, Fixes, Floats
+
+MOVING_MPS = 2.0
+"""Above this speed a vehicle moves for sure."""
+SLACK_M = 10.0
+"""Noise and the receiver's own corrections move a fix by up to this."""
+WAY_M = 5 * SLACK_M
+"""A way against which noise is nothing."""
+STILL_MPS = 1.0
+"""Below this speed positions move by their noise alone."""
+OWN_SLACK_M = 25.0
+"""By so much positions may differ from where the log's own speed and course lead from the one before."""
+STEPS_SLACK_M = 50.0
+"""The same, where the log has no speed and the steps around stand for it."""
+DRIFT_MPS = 1.0
+"""And by so much more for each second between them."""
+BASE_US = 1_000_000
+"""Speed is taken over about this long: over less, noise of a metre is more than the movement."""
+NEAR_US = 3_000_000
+"""Fixes further apart than this say nothing of the speed between them."""
+FAR_S = 60.0
+"""Nor do speeds on the way say where a fix further away than this can be."""
+FROZEN = 0.2
+"""A step this much shorter than the log's own speed makes it is none."""
+FEWEST = 5
+"""Steps without which the log's own speed is not judged."""
+UNITS = {"m/s": 1.0, "knots": 1852 / 3600, "km/h": 1 / 3.6, "miles/h": 0.44704}
+"""Metres a second in one of each unit of speed."""
+AGREES = 1.25
+"""How much the log's own speed may differ from that of its positions, as a factor."""
+AROUND = 5
+"""Steps before and after by which a step is judged."""
+_WORK = 2_000_000_000
+"""Pairs of fixes that are looked at, at most."""
+
+
+def possible(fixes: Fixes, max_speed_mps: float) -> Fixes:
+    """The fixes, in the order of time and in metres, that can be true; the others are counted.
+
+    Raises TrackError where fewer than half can be.
+    """
+    fixes = fixes.without(_same(fixes), "duplicate time")
+    speed = own_speed(fixes)
+    frozen = _frozen(fixes, speed) | _held(fixes, max_speed_mps)
+    fixes, speed = fixes.without(frozen, "repeated while moving"), speed[~frozen]
+    kept = _chain(fixes, speed, max_speed_mps)
+    few = 2 * kept.sum() < len(np.unique(fixes.t_us))
+    if few or _usual_mps(fixes[kept]) > max_speed_mps:
+        raise TrackError(_too_fast(fixes, max_speed_mps))
+    by = "the log's own speed" if np.isfinite(speed).any() else "the movement around"
+    return _split(fixes, kept, max_speed_mps, f"against {by}")
+
+
+def own_speed(fixes: Fixes) -> Floats:
+    """(N,) the log's own speed in m/s, in the unit that fits its positions; NaN where unknown or unfit."""
+    at = _knots(fixes)
+    step_m, step_s = _steps(fixes[at])
+    said = np.diff(_summed(_between(fixes.speed, np.diff(fixes.t_us) / 1e6))[at])
+    used = (step_s <= NEAR_US / 1e6) & (step_m > 0) & (said > MOVING_MPS * step_s)
+    nothing = np.full(len(fixes), np.nan)
+    if used.sum() < FEWEST:
+        return nothing
+    ratio = float(np.median(step_m[used] / said[used]))
+    unit = min(UNITS, key=lambda name: abs(np.log(ratio / UNITS[name])))
+    if AGREES > ratio > 1 / AGREES:
+        unit = "m/s"
+    if not 1 / AGREES < ratio / UNITS[unit] < AGREES:
+        fixes.notes.append(
+            f"the log's own speeds do not fit its positions ({ratio:.2g} m/s each): they are not used"
+        )
+        return nothing
+    return fixes.speed * UNITS[unit]
+
+
+def _steps(fixes: Fixes) -> tuple[Floats, Floats]:
+    """(N - 1,) metres and seconds from each fix to the next."""
+    assert fixes.xy is not None
+    return np.hypot(*np.diff(fixes.xy, axis=0).T), np.diff(fixes.t_us) / 1e6
+
+
+def _knots(fixes: Fixes) -> NDArray[np.int64]:
+    """Fixes about a second apart, or further where the log has no others."""
+    _, first = np.unique(fixes.t_us // BASE_US, return_index=True)
+    return first
+
+
+def _between(values: Floats, span_s: Floats) -> Floats:
+    """(N - 1, ...) what values (N, ...) a second make of each step; 0 where it is not known."""
+    made = (values[1:] + values[:-1]) / 2 * (span_s if values.ndim == 1 else span_s[:, None])
+    return np.where(np.isfinite(made), made, 0.0)
+
+
+def _summed(steps: NDArray[Any]) -> NDArray[Any]:
+    """(N, ...) sums of the steps (N - 1, ...) before each fix."""
+    return np.concatenate([np.zeros_like(steps, shape=(1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
+
+
+def _same(fixes: Fixes) -> Bools:
+    """(N,) which fixes say again what the one before them said."""
+    step_m, step_s = _steps(fixes)
+    return np.concatenate([[False], (step_s == 0) & (step_m <= SLACK_M)])
+
+
+def _frozen(fixes: Fixes, speed: Floats) -> Bools:
+    """(N,) which fixes are where the receiver was a second before, although the log's own speed says no."""
+    assert fixes.xy is not None
+    before = np.searchsorted(fixes.t_us, fixes.t_us - int(0.9 * BASE_US), "right") - 1
+    known = before >= 0
+    before = np.maximum(before, 0)
+    span_s = (fixes.t_us - fixes.t_us[before]) / 1e6
+    slowest = np.minimum(speed[1:], speed[:-1]) * np.diff(fixes.t_us) / 1e6
+    said = _summed(np.where(np.isfinite(slowest), slowest, 0.0))
+    way = said - said[before]
+    metres = np.hypot(*(fixes.xy - fixes.xy[before]).T)
+    near = known & (span_s <= NEAR_US / 1e6)
+    return np.asarray(near & (way > MOVING_MPS * span_s) & (metres < FROZEN * way), np.bool_)
+
+
+def _held(fixes: Fixes, max_speed_mps: float) -> Bools:
+    """(N,) which fixes stand still and are followed by a leap to where moving on would have led."""
+    at = _knots(fixes)
+    step_m, step_s = _steps(fixes[at])
+    held = np.zeros(len(fixes), np.bool_)
+    mps = step_m / np.maximum(step_s, 1e-6)
+    moves = np.flatnonzero(mps > STILL_MPS)
+    for n in np.flatnonzero(np.diff(moves) > 1) + 1:  # steps that end a stretch without movement
+        first, last = moves[n - 1] + 1, moves[n]
+        around = np.concatenate([mps[moves[max(n - AROUND, 0) : n]], mps[moves[n + 1 : n + 1 + AROUND]]])
+        usual = float(np.median(around)) if len(around) > AROUND else 0.0
+        through = step_m[last] / step_s[first : last + 1].sum()
+        leaps = mps[last] > min(1.5 * usual + SLACK_M, max_speed_mps)
+        if usual > MOVING_MPS and leaps and through > usual / 3:
+            held[at[first] + 1 : at[last + 1]] = True
+    return held
+
+
+class Way(NamedTuple):
+    """How a vehicle must have moved by the log's own speed and course, else by the steps around each fix."""
+
+    xy: Floats
+    """(N, 2) metres since the first fix; NaN where no course is known."""
+    metres: Floats
+    """(N,) the length of the way since the first fix."""
+    unknown: NDArray[np.int64]
+    """(N,) steps before each fix of which nothing is known."""
+    slack_m: float
+    """By how much positions may differ from it."""
+
+
+def _way(fixes: Fixes, speed: Floats) -> Way:
+    step_s = np.diff(fixes.t_us) / 1e6
+    own = bool(np.isfinite(speed).any())
+    course = np.deg2rad(np.where(speed > MOVING_MPS, fixes.heading_deg, 0.0))
+    velocity = speed[:, None] * np.column_stack([np.sin(course), np.cos(course)])
+    if not own:
+        velocity = _around(fixes)
+        speed = np.hypot(*velocity.T)
+    elif not _fits(velocity, fixes):
+        velocity = np.full_like(velocity, np.nan)
+    unknown = ~((step_s <= NEAR_US / 1e6) & np.isfinite(speed[1:] + speed[:-1]))
+    moved = np.where(np.isfinite(velocity).any(), _between(velocity, step_s), np.nan)
+    return Way(
+        _summed(moved),
+        _summed(_between(speed, step_s)),
+        _summed(unknown.astype(np.int64)),
+        OWN_SLACK_M if own else STEPS_SLACK_M,
+    )
+
+
+def _fits(own: Floats, fixes: Fixes) -> bool:
+    """Whether the log's own velocities (N, 2) point as its positions move: most within 45 degrees."""
+    assert fixes.xy is not None
+    at = _knots(fixes)
+    moved = np.diff(fixes.xy[at], axis=0)
+    fast = np.hypot(*own[at[1:]].T) * np.hypot(*moved.T)
+    used = fast > MOVING_MPS**2  # False where NaN
+    along = (own[at[1:]][used] * moved[used]).sum(axis=1) / fast[used]
+    return len(along) >= FEWEST and bool(np.median(along) > np.cos(np.pi / 4))
+
+
+def _around(fixes: Fixes) -> Floats:
+    """(N, 2) metres a second: the middle of the AROUND seconds before and after each fix; NaN without any."""
+    assert fixes.xy is not None
+    at = _knots(fixes)
+    span_s = np.diff(fixes.t_us[at]) / 1e6
+    near = span_s <= NEAR_US / 1e6
+    steps = np.diff(fixes.xy[at], axis=0) / np.where(near, span_s, np.nan)[:, None]
+    padded = np.pad(steps, ((AROUND, AROUND), (0, 0)), constant_values=np.nan)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND, axis=0)
+    found = np.full((len(at), 2), np.nan)
+    some = np.isfinite(windows).sum(axis=2).min(axis=1) >= FEWEST
+    found[some] = np.nanmedian(windows[some], axis=2)
+    return np.column_stack([np.interp(fixes.t_us, fixes.t_us[at], found[:, n]) for n in (0, 1)])
+
+
+def _chain(fixes: Fixes, speed: Floats, max_speed_mps: float) -> Bools:
+    """(N,) the most fixes of which each can be reached from the one before; of equals, the shortest way."""
+    assert fixes.xy is not None
+    look = int(min(len(fixes), max(200, _WORK // max(len(fixes), 1))))
+    way = _way(fixes, speed)
+    kept: Bools = _longest(
+        fixes.t_us, fixes.xy, way.xy, way.metres, way.unknown, way.slack_m, float(max_speed_mps), look
+    )
+    return kept
+
+
+def _split(fixes: Fixes, kept: Bools, max_speed_mps: float, otherwise: str) -> Fixes:
+    """The kept fixes; the others are counted by what is wrong with them."""
+    assert fixes.xy is not None
+    at = np.flatnonzero(kept)
+    before = at[np.clip(np.searchsorted(at, np.arange(len(fixes)), "right") - 1, 0, None)]
+    after = at[np.clip(np.searchsorted(at, np.arange(len(fixes))), 0, len(at) - 1)]
+    twice = ~kept & ((fixes.t_us == fixes.t_us[before]) | (fixes.t_us == fixes.t_us[after]))
+    far = np.zeros(len(fixes), np.bool_)
+    for other in (before, after):
+        span_s = np.abs(fixes.t_us - fixes.t_us[other]) / 1e6
+        far |= np.hypot(*(fixes.xy - fixes.xy[other]).T) > max_speed_mps * span_s + SLACK_M
+    reasons = {
+        "duplicate time": twice,
+        f"faster than {max_speed_mps:g} m/s": ~kept & ~twice & far,
+        otherwise: ~kept & ~twice & ~far,
+    }
+    for reason, bad in reasons.items():
+        fixes.without(bad, reason)
+    return fixes[kept]
+
+
+def _usual_mps(fixes: Fixes) -> float:
+    """The usual speed from one fix to one so many further on that noise is nothing; 0 for a short way."""
+    assert fixes.xy is not None
+    lag = 1
+    while lag < len(fixes):
+        metres = np.hypot(*(fixes.xy[lag:] - fixes.xy[:-lag]).T)
+        if np.median(metres) >= WAY_M:
+            span_s = (fixes.t_us[lag:] - fixes.t_us[:-lag]) / 1e6
+            return float(np.median(metres / np.maximum(span_s, 1e-6)))
+        lag *= 2
+    return 0.0
+
+
+def _too_fast(fixes: Fixes, max_speed_mps: float) -> str:
+    """Why most fixes cannot be true."""
+    mps = _usual_mps(fixes)
+    if mps <= max_speed_mps:
+        return (
+            f"fewer than half of the {len(fixes)} fixes fit together at {max_speed_mps:g} m/s or less: it "
+            "holds several drives at once, or noise; `max_speed_mps` allows more"
+        )
+    told = f"the fixes move at {mps:,.0f} m/s, and no vehicle goes faster than {max_speed_mps:g} m/s"
+    units = ["ns", "us", "ms", "s"]
+    in_doubt = fixes.unit in units and not DATED_US[0] <= fixes.t_us[0] <= DATED_US[1]
+    larger = units[units.index(fixes.unit) + 1 :] if in_doubt and fixes.unit else []
+    for n, unit in enumerate(larger, 1):
+        if mps / 1000**n <= max_speed_mps:
+            return (
+                f"{told}: its times were taken in {fixes.unit}, in {unit} it would be "
+                f"{mps / 1000**n:.3g} m/s: `open_track(time_unit={unit})`"
+            )
+    return f"{told}: give the unit of its times, or another `max_speed_mps`"
+
+
+@njit(cache=True)
+def _reachable(
+    i: int, j: int, metres: float, t_us: NDArray[np.int64], xy: Floats, way_xy: Floats, way_m: Floats,
+    unknown: NDArray[np.int64], slack_m: float, max_mps: float,
+) -> bool:  # fmt: skip
+    """Whether a vehicle at fix i can be at fix j."""
+    span_s = (t_us[j] - t_us[i]) / 1e6
+    if span_s <= 0 or metres > max_mps * span_s + SLACK_M:
+        return False
+    way = way_m[j] - way_m[i]
+    if span_s > FAR_S or unknown[j] > unknown[i] or way <= MOVING_MPS * span_s:
+        return True
+    may_m = slack_m + DRIFT_MPS * span_s
+    if np.isnan(way_xy[j, 0]):
+        return bool(metres <= way + may_m)
+    moved = (xy[j] - xy[i]) - (way_xy[j] - way_xy[i])
+    return bool(np.hypot(moved[0], moved[1]) <= may_m)
+
+
+@njit(cache=True)
+def _longest(
+    t_us: NDArray[np.int64], xy: Floats, way_xy: Floats, way_m: Floats, unknown: NDArray[np.int64],
+    slack_m: float, max_mps: float, look: int,
+) -> NDArray[np.bool_]:  # fmt: skip
+    """Dynamic programming over the fixes; a better chain is looked for no further back than one can be."""
+    n = len(t_us)
+    count, most, before = np.ones(n, np.int64), np.ones(n, np.int64), np.full(n, -1)
+    length = np.zeros(n)
+    for j in range(n):
+        for i in range(j - 1, max(j - look, 0) - 1, -1):
+            if most[i] + 1 < count[j]:
+                break
+            metres = np.hypot(xy[j, 0] - xy[i, 0], xy[j, 1] - xy[i, 1])
+            more = count[i] + 1 > count[j]
+            shorter = count[i] + 1 == count[j] and length[i] + metres < length[j]
+            if (more or shorter) and _reachable(
+                i, j, metres, t_us, xy, way_xy, way_m, unknown, slack_m, max_mps
+            ):
+                count[j], length[j], before[j] = count[i] + 1, length[i] + metres, i
+        most[j] = max(count[j], most[j - 1]) if j else count[j]
+    best = 0
+    for j in range(n):
+        if count[j] > count[best] or (count[j] == count[best] and length[j] < length[best]):
+            best = j
+    kept = np.zeros(n, np.bool_)
+    while best >= 0:
+        kept[best] = True
+        best = before[best]
+    return kept

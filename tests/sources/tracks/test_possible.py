@@ -1,0 +1,221 @@
+"""Faults of a receiver that place images wrongly without a word: what is left must be true."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from evplace.core.errors import TrackError
+from evplace.sources.tracks import Track, open_track
+from made_logs import DEGREES, LATITUDE, LONGITUDE, MPS, START_S, Log, csv_log, gpx_log, rmc_log, written
+
+Fault = Callable[[Log], None]
+
+
+def aside(metres: float, first: int, last: int) -> Fault:
+    """Positions that lie aside for a while, as of a reflected signal."""
+
+    def make(log: Log) -> None:
+        log.longitude[first:last] += metres * DEGREES / np.cos(np.deg2rad(LATITUDE))
+
+    return make
+
+
+def other_hemisphere(first: int, last: int) -> Fault:
+    def make(log: Log) -> None:
+        log.latitude[first:last] *= -1
+
+    return make
+
+
+def other_side_of_greenwich(first: int, last: int) -> Fault:
+    def make(log: Log) -> None:
+        log.longitude[first:last] *= -1
+
+    return make
+
+
+def frozen(first: int, last: int) -> Fault:
+    """The receiver repeats one position; its speed goes on."""
+
+    def make(log: Log) -> None:
+        log.latitude[first:last] = log.latitude[first]
+
+    return make
+
+
+def time_of_one(at: int, seconds: float) -> Fault:
+    def make(log: Log) -> None:
+        log.t_s[at] += seconds
+
+    return make
+
+
+def clock_for_a_while(first: int, last: int, seconds: float) -> Fault:
+    def make(log: Log) -> None:
+        log.t_s[first:last] += seconds
+
+    return make
+
+
+FAULTS = {
+    "ten fixes 550 m off": aside(550, 50, 60),
+    "ten fixes 60 m off": aside(60, 50, 60),
+    "thirty fixes 2 km off": aside(-2000, 100, 130),
+    "the first ten 550 m off": aside(550, 0, 10),
+    "the last ten 550 m off": aside(550, 190, 200),
+    "one fix 300 m off": aside(300, 77, 78),
+    "five of the other hemisphere": other_hemisphere(50, 55),
+    "the first fix of the other hemisphere": other_hemisphere(0, 1),
+    "three west of Greenwich": other_side_of_greenwich(80, 83),
+    "frozen for 30 s": frozen(50, 80),
+    "frozen for 5 s": frozen(120, 125),
+    "frozen twice": lambda log: (frozen(20, 40)(log), frozen(90, 130)(log)),  # type: ignore[func-returns-value]
+    "one time 40 s ahead": time_of_one(100, 40),
+    "one time 40 s behind": time_of_one(100, -40),
+    "one time 5 s ahead": time_of_one(60, 5),
+    "the last time 40 s ahead": time_of_one(199, 40),
+    "a clock 5 s off for 20 s": clock_for_a_while(70, 90, 5),
+}
+BY_OWN_SPEED = ("frozen for 5 s", "ten fixes 60 m off")
+"""These leave hardly a trace in a log that has no speed of its own."""
+LOGS = {"rmc": rmc_log, "csv": csv_log, "gpx": gpx_log}
+
+
+def placed(track: Track, log: Log) -> tuple[np.ndarray, np.ndarray]:
+    """Metres by which each image (10 a second) is placed wrong, NaN without a position; which have one."""
+    t_s = np.arange(0, log.seconds, 0.1)
+    here = track.at(np.round((START_S + t_s) * 1e6).astype(np.int64))
+    north = (here.latitude - LATITUDE) / DEGREES - MPS * t_s
+    east = (here.longitude - LONGITUDE) / DEGREES * np.cos(np.deg2rad(LATITUDE))
+    return np.hypot(north, east), here.known
+
+
+@pytest.mark.parametrize("kind", LOGS)
+def test_a_good_log_is_whole(tmp_path: Path, kind: str) -> None:
+    track = open_track(written(tmp_path, LOGS[kind](Log())))
+    assert (len(track), track.dropped) == (200, {})
+    wrong, known = placed(track, Log())
+    assert known.sum() == 1991
+    assert np.nanmax(wrong) < 3
+
+
+@pytest.mark.parametrize(
+    ("kind", "fault"),
+    [(kind, fault) for fault in FAULTS for kind in LOGS if kind == "rmc" or fault not in BY_OWN_SPEED],
+)
+def test_no_image_is_placed_wrong_and_the_reason_is_told(tmp_path: Path, kind: str, fault: str) -> None:
+    log = Log()
+    FAULTS[fault](log)
+    track = open_track(written(tmp_path, LOGS[kind](log)))
+    wrong, known = placed(track, log)
+    assert np.nanmax(wrong) < 25
+    assert known.mean() > 0.6
+    assert sum(track.dropped.values()) == log.seconds - len(track) > 0
+    assert any("left out of the track" in note and "first " in note for note in track.notes)
+
+
+@pytest.mark.parametrize("kind", LOGS)
+@pytest.mark.parametrize(("at", "seconds"), [(70, 5), (150, 5), (20, -5), (100, 40), (100, -3)])
+def test_a_clock_that_was_set_is_asked_about(tmp_path: Path, kind: str, at: int, seconds: int) -> None:
+    log = Log()
+    log.t_s[at:] += seconds
+    path = written(tmp_path, LOGS[kind](log))
+    with pytest.raises(TrackError, match=rf"set by \{seconds:+d} s at .*keep='before'") as caught:
+        open_track(path)
+    assert "--track-keep before" in str(caught.value)
+    wrong, known = placed(open_track(path, keep="before"), log)
+    assert np.nanmax(wrong) < 3
+    assert known.sum() == 10 * (at - 1) + 1
+    later = open_track(path, keep="after", offset_us=-seconds * 1_000_000)
+    wrong, known = placed(later, log)
+    assert np.nanmax(wrong) < 3
+    assert known.sum() == 10 * (199 - at) + 1
+
+
+def test_the_example_is_the_first_wrong_line(tmp_path: Path) -> None:
+    log = Log()
+    aside(550, 50, 60)(log)
+    track = open_track(written(tmp_path, rmc_log(log)))
+    assert track.dropped == {"faster than 70 m/s": 10}
+    line = rmc_log(log).splitlines()[50]
+    assert track.notes == (f"left out of the track: 10 faster than 70 m/s (first line 51: {line})",)
+
+
+@pytest.mark.parametrize(("unit", "per_s"), [("us", 1e3), ("us", 1), ("ns", 1e3), ("ns", 1e6), ("ms", 1)])
+def test_speeds_that_cannot_be_name_the_unit(tmp_path: Path, unit: str, per_s: float) -> None:
+    """Times of a log that is read in a unit 1000 times too small, or more."""
+    rows = [f"{(t - START_S) * per_s:.0f},{lat:.7f},{lon}" for t, lat, lon, _, _ in Log(60).rows()]
+    path = written(tmp_path, "\n".join(["timestamp,latitude,longitude", *rows]))
+    true = {1: "s", 1e3: "ms", 1e6: "us"}[per_s]
+    told = rf"m/s: its times were taken in {unit}, in {true} it would be 9\.96 m/s: time_unit='{true}'"
+    with pytest.raises(TrackError, match=told):
+        open_track(path, time_unit=unit)
+    assert len(open_track(path, time_unit=true)) == 60
+
+
+@pytest.mark.parametrize("mps", [71.0, 90.0, 250.0])
+def test_a_faster_vehicle_is_allowed_on_demand(tmp_path: Path, mps: float) -> None:
+    log = Log(60)
+    log.latitude = LATITUDE + (log.t_s - START_S) * mps * DEGREES
+    path = written(tmp_path, csv_log(log))
+    if mps > 80:
+        with pytest.raises(TrackError, match="max_speed_mps"):
+            open_track(path)
+    assert len(open_track(path, max_speed_mps=300.0)) == 60
+
+
+@pytest.mark.parametrize("factor", [3600 / 1852, 3.6, 2.2369])
+def test_the_unit_of_the_logs_own_speed_is_found(tmp_path: Path, factor: float) -> None:
+    """Knots, km/h and miles an hour: the freeze shows by the speed alone."""
+    log = Log()
+    frozen(150, 200)(log)
+    rows = [f"{t * 1e6:.0f},{lat:.8f},{lon},{mps * factor:.3f}" for t, lat, lon, mps, _ in log.rows()]
+    track = open_track(written(tmp_path, "\n".join(["timestamp,latitude,longitude,speed", *rows])))
+    assert track.dropped == {"repeated while moving": 49}
+
+
+@pytest.mark.parametrize("speed", [0.0, 900.0])
+def test_speeds_that_do_not_fit_are_not_used(tmp_path: Path, speed: float) -> None:
+    log = Log()
+    log.mps[:] = speed
+    track = open_track(written(tmp_path, rmc_log(log)))
+    assert len(track) == 200
+    assert any("own speeds do not fit" in note for note in track.notes) == (speed > 0)
+
+
+def test_a_vehicle_that_stands_loses_no_fix(tmp_path: Path) -> None:
+    log = Log()
+    way = np.concatenate([np.arange(80), np.full(40, 79.0), np.arange(80, 160)])
+    log.latitude = LATITUDE + MPS * way * DEGREES
+    log.mps = np.where(np.diff(way, append=way[-1] + 1) > 0, MPS, 0.0)
+    for kind, make in LOGS.items():
+        assert len(open_track(written(tmp_path, make(log), kind))) == 200
+
+
+def by_every_pair(log: Log, max_mps: float = 70.0) -> int:
+    """The size of the largest set of fixes in which each can be reached from the one before: all pairs."""
+    t_s, north = log.t_s, (log.latitude - LATITUDE) / DEGREES
+    best = np.ones(len(t_s), int)
+    for j in range(len(t_s)):
+        for i in range(j):
+            if t_s[j] > t_s[i] and abs(north[j] - north[i]) <= max_mps * (t_s[j] - t_s[i]) + 10:
+                best[j] = max(best[j], best[i] + 1)
+    return int(best.max())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_as_many_fixes_as_can_be_are_kept(tmp_path: Path, seed: int) -> None:
+    """Fixes too far apart in time to say anything of the movement: only the fastest speed decides."""
+    rng = np.random.default_rng(seed)
+    log = Log(60)
+    log.t_s = START_S + 10.0 * np.arange(60)
+    wrong = rng.random(60) < 0.3
+    log.latitude = (
+        LATITUDE + np.where(wrong, rng.uniform(-20_000, 20_000, 60), 100.0 * np.arange(60)) * DEGREES
+    )
+    track = open_track(written(tmp_path, csv_log(log)))
+    assert len(track) == by_every_pair(log)
