@@ -41,7 +41,7 @@ def test_a_good_drive_has_no_alarm(tmp_path: Path) -> None:
     found = examine(recording, track)
     assert found.fault is None
     assert not found.count("bad")
-    assert {finding.name for finding in found.findings if finding.state == "look"} <= {"GPS gaps"}
+    assert {finding.name for finding in found.findings if finding.state == "look"} <= {"GPS gaps", "GPS log"}
     assert found.facts | {"t_last_us": 0} == {
         "kind": "events", "width": 80, "height": 60, "events": len(make_drive(windows=300).events),
         "t_first_us": 0, "t_last_us": 0, "format": "aedat4",

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import RecordingError
 from evplace.core.events import Events
-from evplace.imaging.representations import Binary, Count, Polarity, Representation, TimeSurface, Voxel
+from evplace.imaging.representations import Representation
+from evplace.imaging.representations.binary import Binary
+from evplace.imaging.representations.count import Count
+from evplace.imaging.representations.polarity import Polarity
+from evplace.imaging.representations.time_surface import TimeSurface
+from evplace.imaging.representations.voxel import Voxel
 
 SIZE = (7, 5)
 SATURATION, TAU_US, BINS = 3, 40.0, 4
@@ -68,7 +73,7 @@ KINDS: dict[str, tuple[Callable[[], Representation], Callable[..., NDArray[np.fl
     "binary": (lambda: Binary(SIZE), binary),
     "polarity": (lambda: Polarity(SIZE), polarity),
     "count": (lambda: Count(SIZE, SATURATION), count),
-    "time-surface": (lambda: TimeSurface(SIZE, TAU_US), surface),
+    "time-surface": (lambda: TimeSurface(SIZE, TAU_US / 1000), surface),
     "voxel": (lambda: Voxel(SIZE, BINS, SATURATION), voxel),
 }
 every = pytest.mark.parametrize("kind", KINDS)
@@ -125,7 +130,7 @@ def test_corners_are_inside(kind: str) -> None:
 
 
 def test_an_event_after_the_windows_end_is_as_fresh_as_can_be() -> None:
-    one = TimeSurface(SIZE, TAU_US)
+    one = TimeSurface(SIZE, TAU_US / 1000)
     one.add(events_of([(50, 1, 1, True)]))
     assert one.channels(20)[0, 1, 1] == 1.0
 

@@ -76,7 +76,7 @@ def test_slow_images_are_told(folder: Path, step: int) -> None:
     frames = open_frames(folder)
     assert frames.t_us.tolist() == [0, step * 1_000_000, 2 * step * 1_000_000]
     assert f"{step:,} s apart" in frames.notes[0]
-    assert "--time-unit" in frames.notes[0]
+    assert "`time_unit`" in frames.notes[0]
 
 
 NAMES = {

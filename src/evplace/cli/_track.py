@@ -66,7 +66,7 @@ class TrackFlags(SettingsFlags):
 
     def _refuse_others(self) -> None:
         """SettingsError where a flag of a track is set."""
-        own = [field for field in dataclasses.fields(TrackFlags) if field.name != "track"]
+        own = [field for field in dataclasses.fields(TrackFlags) if field.name.startswith("track_")]
         if any(getattr(self, field.name) != field.default for field in own):
             flags = ", ".join(f"--{field.name.replace('_', '-')}" for field in own)
             raise SettingsError(f"{flags} need a --track")

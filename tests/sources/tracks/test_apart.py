@@ -76,14 +76,14 @@ def test_a_log_of_another_unit(unit: str, factor: float, true: str) -> None:
 def test_a_recording_of_another_unit(factor: float) -> None:
     told = apart(shifted(0), round(FIRST_US * factor), round(LAST_US * factor))
     assert "the images' times differ by a factor of 1,000" in told.sentence
-    assert "--time-unit" in told.advice
+    assert "`time_unit`" in told.advice
 
 
 @pytest.mark.parametrize("first_us", [0, 33_333, 5_000_000])
 def test_a_recording_that_counts_from_its_own_start(first_us: int) -> None:
     told = apart(shifted(0), first_us, first_us + 190_000_000)
     assert "the images do not count from 1970" in told.sentence
-    seconds = float(re.search(r"--track-offset (-[\d.]+)", told.advice)[1])  # type: ignore[index]
+    seconds = float(re.search(r"--track-offset (-[\d.]+)", in_flags(told.advice))[1])  # type: ignore[index]
     assert START_S * 1e6 + seconds * 1e6 == pytest.approx(first_us)
 
 

@@ -124,9 +124,9 @@ def test_a_clock_that_was_set_is_asked_about(tmp_path: Path, kind: str, at: int,
     log = Log()
     log.t_s[at:] += seconds
     path = written(tmp_path, LOGS[kind](log))
-    with pytest.raises(TrackError, match=rf"set by \{seconds:+d} s at .*keep='before'") as caught:
+    with pytest.raises(TrackError, match=rf"set by \{seconds:+d} s at .*`keep=before`") as caught:
         open_track(path)
-    assert "--track-keep before" in str(caught.value)
+    assert "`keep=before`" in str(caught.value)
     wrong, known = placed(open_track(path, keep="before"), log)
     assert np.nanmax(wrong) < 3
     assert known.sum() == 10 * (at - 1) + 1
@@ -151,7 +151,8 @@ def test_speeds_that_cannot_be_name_the_unit(tmp_path: Path, unit: str, per_s: f
     rows = [f"{(t - START_S) * per_s:.0f},{lat:.7f},{lon}" for t, lat, lon, _, _ in Log(60).rows()]
     path = written(tmp_path, "\n".join(["timestamp,latitude,longitude", *rows]))
     true = {1: "s", 1e3: "ms", 1e6: "us"}[per_s]
-    told = rf"m/s: its times were taken in {unit}, in {true} it would be 9\.96 m/s: time_unit='{true}'"
+    cause = rf"m/s: its times were taken in {unit}, in {true} it would be 9\.96 m/s: "
+    told = cause + rf"`open_track\(time_unit={true}\)`"
     with pytest.raises(TrackError, match=told):
         open_track(path, time_unit=unit)
     assert len(open_track(path, time_unit=true)) == 60

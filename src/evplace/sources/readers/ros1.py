@@ -36,7 +36,7 @@ def matches(path: Path, head: bytes) -> bool:
 
 def read(path: Path, hints: Hints) -> Source:
     """The wanted topic with events, else the first; UnsupportedError where there is none."""
-    return source(Bag(path, partial(_messages, path), _topics(path), aligned=False), hints)
+    return source(Bag(path, partial(messages, path), _topics(path), aligned=False), hints)
 
 
 def _topics(path: Path) -> dict[str, str]:
@@ -57,7 +57,7 @@ def _topics(path: Path) -> dict[str, str]:
     return dict(connections.values())
 
 
-def _messages(path: Path) -> Iterator[Message]:
+def messages(path: Path) -> Iterator[Message]:
     """All messages in the order of the file; DamagedRecordingError where it breaks off."""
     connections: _Connections = {}
     try:

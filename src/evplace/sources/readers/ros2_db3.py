@@ -38,6 +38,11 @@ def read(path: Path, hints: Hints) -> Source:
     return source(Bag(path, partial(_messages, files), _topics(files), aligned=True), hints)
 
 
+def messages(path: Path) -> Iterator[Message]:
+    """All messages of a bag, in the order of its files."""
+    return _messages(bag_files(path, ".db3"))
+
+
 def _topics(files: list[BagFile]) -> dict[str, str]:
     """Topic -> type of all that have messages; empty where a file is damaged."""
     found: dict[str, str] = {}

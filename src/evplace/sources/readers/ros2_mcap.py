@@ -54,6 +54,11 @@ def read(path: Path, hints: Hints) -> Source:
     return source(Bag(path, partial(_messages, files), _topics(files), aligned=True), hints)
 
 
+def messages(path: Path) -> Iterator[Message]:
+    """All messages of a bag, in the order of its files."""
+    return _messages(bag_files(path, ".mcap"))
+
+
 def _topics(files: list[BagFile]) -> dict[str, str]:
     """Topic -> type of all that have messages, from the summaries; empty where one is missing or damaged."""
     found: dict[str, str] = {}

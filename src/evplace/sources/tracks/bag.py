@@ -89,7 +89,7 @@ def read(path: Path, settings: Settings) -> Fixes:
     topics: dict[tuple[str, str], Topic | None] = {}
     fault = None
     try:
-        for message in bag._messages(path):
+        for message in bag.messages(path):
             key = message.topic, message.kind
             if key not in topics:
                 topics[key] = Topic(message) if message.kind in FIXES + POSES else None

@@ -18,7 +18,7 @@ from typing import Literal
 from evplace.core.errors import TrackError
 from evplace.sources._times import clock_us, dated_unit, iso_us, number, number_us, of_day_us
 from evplace.sources.tracks import nmea, poses
-from evplace.sources.tracks._fixes import Fix, Fixes, Losses, line_of, unroll_days
+from evplace.sources.tracks._fixes import Fix, Fixes, Losses, line_of, shown, unroll_days
 
 _CLOCK = re.compile(r"[0-9]{1,8}")
 _ZONE = re.compile(r"([0-9]{1,2})\s*([C-HJ-NP-X]?)", re.IGNORECASE)
@@ -162,7 +162,7 @@ def _position_reader(header: list[str], settings: Settings) -> Callable[[Row], t
     if missing or not (set(geographic) <= set(header) or set(metric) <= set(header)):
         absent = missing or [name for name in geographic if name not in header]
         raise TrackError(
-            f"no column {' or '.join(map(repr, absent))}: it has {', '.join(header)[:200]}; name the "
+            f"no column {' or '.join(map(repr, absent))}: it has {shown(', '.join(header))}; name the "
             "columns by the settings time, latitude, longitude (or easting, northing, utm_zone), or "
             f"choose a preset: {', '.join(PRESETS)}"
         )
