@@ -394,6 +394,6 @@ def test_guesses_are_told_and_unclear_ones_refused(folder: Path, street: Path, c
         told = capsys.readouterr().err
         assert "evplace: times in 't' are taken as us" in told
         assert ("128x128 inferred from its events" in told) == (size[1] not in command)
-    np.savez(folder / "unclear.npz", t=events.t_us * 1000, x=events.x, y=events.y, p=events.p)
+    np.savez(folder / "unclear.npz", t=events.t_us * 10, x=events.x, y=events.y, p=events.p)
     told = fault(capsys, "images", folder / "unclear.npz", "-o", folder / "u")
-    assert "give the time unit" in told
+    assert "give the time unit, as in --time-unit us" in told
