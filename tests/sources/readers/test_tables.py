@@ -26,7 +26,7 @@ def table(order: str, kind: str, signs: bool = False, unit: float = 1.0, start: 
     """(N, k) of fields by their letters: i counts rows, 0 is zero, w is a fraction."""
     columns = {
         "t": start + SOME.t_us * unit, "x": SOME.x, "y": SOME.y, "p": SIGNS if signs else SOME.p,
-        "i": np.arange(len(SOME)), "0": np.zeros(len(SOME)), "w": np.sin(np.arange(len(SOME))),
+        "i": np.arange(len(SOME)), "0": np.zeros(len(SOME)), "w": 50 + 40 * np.sin(np.arange(len(SOME))),
     }  # fmt: skip
     return np.stack([columns[letter] for letter in order], axis=1).astype(kind)
 
