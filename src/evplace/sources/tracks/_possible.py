@@ -47,7 +47,7 @@ AGREES = 1.25
 """How much the log's own speed may differ from that of its positions, as a factor."""
 AROUND = 5
 """Steps before and after by which a step is judged."""
-_WORK = 2_000_000_000
+_WORK = 100_000_000
 """Pairs of fixes that are looked at, at most."""
 
 
