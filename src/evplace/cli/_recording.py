@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal
 
+from evplace.cli._settings import a_part_of
 from evplace.sources.readers import Recording, open_recording
 
 
@@ -27,3 +28,19 @@ class RecordingFlags:
         return open_recording(
             path, self.size, time_unit=self.time_unit, stream=self.stream, columns=self.columns
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class DriveFlags(RecordingFlags):
+    """Which drive, where a folder holds several, and what the user knows better than its files."""
+
+    drive: str | None = None
+    """For a data set: which drive."""
+    dataset: Annotated[str | None, a_part_of("datasets")] = None
+    """For a data set that is not recognised by its layout: its name."""
+
+    def reading(self) -> dict[str, Any]:
+        """How the source is read, as arguments of `open_traverse`; its size only where it is given."""
+        names = ("time_unit", "stream", "columns", "drive", "dataset")
+        known: dict[str, Any] = {name: getattr(self, name) for name in names}
+        return known if self.size is None else known | {"size": self.size}

@@ -13,12 +13,12 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
-from evplace.cli._recording import RecordingFlags
+from evplace.cli._recording import DriveFlags
 from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
 from evplace.cli._track import TrackFlags
 from evplace.core.errors import MissingExtraError, SettingsError
@@ -45,7 +45,7 @@ ROWS: dict[str, Literal["queries", "references"]] = {
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags, RecordingFlags):
+class Args(TrackFlags, DriveFlags):
     """Flags of `evplace evaluate`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (
@@ -54,8 +54,8 @@ class Args(TrackFlags, RecordingFlags):
 
     map: tyro.conf.Positional[Path]
     """A map that `evplace train` wrote."""
-    drive: tyro.conf.Positional[Path]
-    """The query drive: an event recording, a folder of images, or a traverse folder."""
+    source: tyro.conf.Positional[Path]
+    """The query drive: an event recording, a video, a folder of images, a data set or a traverse folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The result folder to write."""
     truth: Path | None = None
@@ -121,11 +121,7 @@ def run(args: Args) -> int:
 
 def _opened(args: Args, place_map: PlaceMap) -> Traverse:
     """The query, its images made as the map's were."""
-    size: dict[str, Any] = {} if args.size is None else {"size": args.size}
-    return place_map.open(
-        args.drive, args.opened_track(), args.time_unit, args.mask, stream=args.stream, columns=args.columns,
-        **size,
-    )  # fmt: skip
+    return place_map.open(args.source, args.opened_track(), mask=args.mask, **args.reading())
 
 
 def _truth(args: Args, place_map: PlaceMap, query: Traverse) -> Truth | None:

@@ -17,12 +17,12 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
-from evplace.cli._recording import RecordingFlags
+from evplace.cli._recording import DriveFlags
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.core.errors import DamagedRecordingError
 from evplace.core.storage import new_file
@@ -39,15 +39,15 @@ COLUMNS = ("t_us", "place", "easting", "northing", "score", "state")
 
 
 @dataclass(frozen=True)
-class Args(SettingsFlags, RecordingFlags):
+class Args(SettingsFlags, DriveFlags):
     """Flags of `evplace localize`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (Part.of("matchers", "matcher", preset="preset"),)
 
     map: tyro.conf.Positional[Path]
     """A map that `evplace train` wrote."""
-    drive: tyro.conf.Positional[Path]
-    """An event recording, a video, a folder of images, or a traverse folder."""
+    source: tyro.conf.Positional[Path]
+    """An event recording, a video, a folder of images, a data set or a traverse folder."""
     matcher: Annotated[str, a_part_of("matchers")] = "local"
     """How score rows become answers; `evplace list matchers` says what each does."""
     preset: Annotated[str | None, a_preset_of("matchers")] = None
@@ -74,16 +74,7 @@ class _Drive:
     def __iter__(self) -> Iterator[Match]:
         events = self._events()
         if events is None:
-            args, mask = self._args, self._where.mask
-            query = self._where.map.open(
-                args.drive,
-                None,
-                args.time_unit,
-                mask,
-                stream=args.stream,
-                columns=args.columns,
-                **self._size(),
-            )
+            query = self._where.map.open(self._args.source, mask=self._where.mask, **self._args.reading())
             self.fault = query.info.get("fault")
             yield from self._where.match_traverse(query)
             return
@@ -98,20 +89,17 @@ class _Drive:
     def _events(self) -> Recording | SimulatedRecording | None:
         """What can be pushed packet by packet, its mask measured; None for images."""
         recipe = self._where.map.recipe
-        if (self._args.drive / TRAVERSE).exists() or recipe is None:
+        if (self._args.source / TRAVERSE).exists() or recipe is None:
             return None
-        reading = Reading(self._args.time_unit, self._args.stream, self._args.columns)
-        drive = open_source_for(self._args.drive, recipe, self._size(), reading)
+        known = self._args.reading()
+        size = {"size": known.pop("size")} if "size" in known else {}
+        drive = open_source_for(self._args.source, recipe, size, Reading(**known))
         source = recorded_as(recipe.kind, drive)
         if isinstance(source, Film):
             return None
         given = self._where.mask if self._where.mask is not None else drive.mask
         self._where.mask = pixel_mask(source.packets(), source.size, recipe.cleaning, given)
         return source
-
-    def _size(self) -> dict[str, Any]:
-        """The size of the sensor, where it was given."""
-        return {} if self._args.size is None else {"size": self._args.size}
 
 
 def run(args: Args) -> int:

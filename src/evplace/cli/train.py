@@ -6,6 +6,7 @@ Examples:
   evplace train day -o campus.evp --preset paper --seed 1            day is a traverse folder
   evplace train day -o campus.evp --scorer ncc --set sigma=2         no training: images are the map
   evplace train day -o campus.evp --run-length 10                    no GPS: ten images are a place
+  evplace train brisbane/ --drive sunset1 -o sunset1.evp             a drive of a data set, with its GPS
 
 A run that was stopped goes on where it was when the same command is given again.
 """
@@ -22,7 +23,7 @@ import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
 from evplace.cli._recipe import recipe_settings, spacing_given
-from evplace.cli._recording import RecordingFlags
+from evplace.cli._recording import DriveFlags
 from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
 from evplace.cli._track import TrackFlags
 from evplace.core import families
@@ -42,14 +43,14 @@ from evplace.sources.cleaning import CleaningSettings
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags, RecordingFlags):
+class Args(TrackFlags, DriveFlags):
     """Flags of `evplace train`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (*TrackFlags.PARTS, Part.of("scorers", "scorer", preset="preset"))
     TABLE_PRESETS: ClassVar[Mapping[str, Mapping[str, Any]]] = {"train": TrainSettings.presets}
 
-    drive: tyro.conf.Positional[Path]
-    """The drive to learn: an event recording, a folder of images, or a traverse folder."""
+    source: tyro.conf.Positional[Path]
+    """The drive to learn: a recording, a video, a folder of images, a data set or a traverse folder."""
     out: Annotated[Path, tyro.conf.arg(aliases=["-o"])]
     """The map to write."""
     cell_m: float = 20.0
@@ -83,8 +84,8 @@ def run(args: Args) -> int:
     check_new_folder(args.out, args.overwrite, MARK)  # said before the training, not after it
     scorer = _scorer(args)
     reference = open_traverse(
-        args.drive, args.opened_track(), None, args.time_unit, spacing_given(args), args.mask,
-        stream=args.stream, columns=args.columns, **recipe_settings(args),
+        args.source, args.opened_track(), spacing=spacing_given(args), mask=args.mask,
+        **(args.reading() | recipe_settings(args)),
     )  # fmt: skip
     places = _places(args, reference)
     began = time.monotonic()
@@ -116,7 +117,7 @@ def _places(args: Args, reference: Traverse) -> Places:
         return PlaceRuns(len(reference), args.run_length, args.tolerance)
     if reference.track is None:
         raise TraverseError(
-            f"{args.drive} has no positions: add --track with its GPS log, or --run-length for places "
+            f"{args.source} has no positions: add --track with its GPS log, or --run-length for places "
             "that are stretches of images"
         )
     return PlaceGrid.from_track(reference.track, args.cell_m)
