@@ -327,10 +327,10 @@ def orders(words: list[str], more: list[list[str]]) -> Iterator[list[str]]:
         ("convert", ("source", "target"), []),
         ("info", ("recording",), []),
         ("doctor", ("recording",), []),
-        ("localize", ("map", "drive"), []),
-        ("evaluate", ("map", "drive"), ["-o", "r"]),
+        ("localize", ("map", "source"), []),
+        ("evaluate", ("map", "source"), ["-o", "r"]),
         ("images", ("source",), ["-o", "r"]),
-        ("train", ("drive",), ["--out=r"]),
+        ("train", ("source",), ["--out=r"]),
     ],
 )
 def test_a_flag_of_two_values_stands_anywhere(command: str, names: tuple[str, ...], out: list[str]) -> None:
