@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_logs import START_S, Log, gga_body, rmc_log, sentence, written
 
 from evplace.sources.tracks import Track, open_track
 from evplace.sources.tracks._apart import apart, on_day_of
+from made_logs import START_S, Log, gga_body, rmc_log, sentence, written
 
 FIRST_US, LAST_US = START_S * 1_000_000 + 2_000_000, START_S * 1_000_000 + 190_000_000
 WEEKS_S = 1024 * 7 * 86_400
@@ -116,7 +116,7 @@ def test_a_log_without_dates_over_midnight(tmp_path: Path, before_s: int) -> Non
     log.t_s = midnight_s - before_s + np.arange(200.0)
     text = "\n".join(sentence(gga_body(t, lat, lon)) for t, lat, lon, _, _ in log.rows())
     bare = open_track(written(tmp_path, text))
-    for first_s in (log.t_s[0], midnight_s - 1, midnight_s + 5, log.t_s[-1]):
+    for first_s in (log.t_s[0] - 100, log.t_s[0], midnight_s - 1, midnight_s + 5, log.t_s[-1] + 100):
         assert on_day_of(bare, int(first_s * 1e6)).t_us[0] == round(log.t_s[0] * 1e6)
 
 

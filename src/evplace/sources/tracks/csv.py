@@ -18,7 +18,7 @@ from typing import Literal
 from evplace.core.errors import TrackError
 from evplace.sources._times import clock_us, dated_unit, iso_us, number, number_us, of_day_us
 from evplace.sources.tracks import nmea, poses
-from evplace.sources.tracks._fixes import Fix, Fixes, Losses, line_of, unroll_days
+from evplace.sources.tracks._fixes import Fix, Fixes, Losses, line_of, shown, unroll_days
 
 _CLOCK = re.compile(r"[0-9]{1,8}")
 _ZONE = re.compile(r"([0-9]{1,2})\s*([C-HJ-NP-X]?)", re.IGNORECASE)
@@ -149,7 +149,7 @@ def _named(header: list[str], settings: Settings) -> tuple[Settings, list[str]]:
             found = [lower[name] for name in (default, *_OTHER_NAMES[default]) if name in lower]
             if found:
                 chosen[field] = found[0]
-    notes = [f"the column '{name}' is taken for the {field}" for field, name in chosen.items()]
+    notes = [f"the column '{shown(name)}' is taken for the {field}" for field, name in chosen.items()]
     return replace(settings, **chosen), notes  # type: ignore[arg-type]  # all of them are names
 
 
@@ -162,7 +162,7 @@ def _position_reader(header: list[str], settings: Settings) -> Callable[[Row], t
     if missing or not (set(geographic) <= set(header) or set(metric) <= set(header)):
         absent = missing or [name for name in geographic if name not in header]
         raise TrackError(
-            f"no column {' or '.join(map(repr, absent))}: it has {', '.join(header)[:200]}; name the "
+            f"no column {' or '.join(map(repr, absent))}: it has {shown(', '.join(header))}; name the "
             "columns by the settings time, latitude, longitude (or easting, northing, utm_zone), or "
             f"choose a preset: {', '.join(PRESETS)}"
         )
@@ -233,9 +233,9 @@ def _clock(
     numbers = [number(text) for text in texts if _is(number, text)]
     told = dated_unit(numbers)
     if told not in (None, "us"):
-        notes.append(f"the times of the column '{name}' are taken in {told}, in which they are dates")
+        notes.append(f"the times of the column '{shown(name)}' are taken in {told}, in which they are dates")
     if told is None and numbers:
-        notes.append(f"the times of the column '{name}' are no dates: they are taken in us")
+        notes.append(f"the times of the column '{shown(name)}' are no dates: they are taken in us")
     chosen = told or "us"
     return (lambda row: number_us(row[name], chosen)), chosen
 
