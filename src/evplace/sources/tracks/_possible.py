@@ -173,12 +173,12 @@ def _way(fixes: Fixes, speed: Floats) -> Way:
 def _velocity(fixes: Fixes, speed: Floats) -> Floats:
     """(N, 2) metres a second by the log's own speed and course, or along the steps where it has no course."""
     course = np.deg2rad(np.where(speed > MOVING_MPS, fixes.heading_deg, 0.0))
-    own = speed[:, None] * np.column_stack([np.sin(course), np.cos(course)])
+    own: Floats = speed[:, None] * np.column_stack([np.sin(course), np.cos(course)])
     if _fits(own, fixes):
         return own
     around = _around(fixes)
     along: Floats = around / np.maximum(np.hypot(*around.T), 1e-9)[:, None]
-    return along * speed[:, None]
+    return np.asarray(along * speed[:, None], np.float64)
 
 
 def _fits(own: Floats, fixes: Fixes) -> bool:
