@@ -106,6 +106,14 @@ def test_the_finding_tells_what_to_add(added_s: float, state: str) -> None:
     assert curve.spans[0][0] < curve.spans[0][1]
 
 
+@pytest.mark.parametrize("added_s", [18.0, -18.0])
+def test_leap_seconds_are_named(added_s: float) -> None:
+    events, track = drive(added_s)
+    finding = found(offset, events, "clock offset", track)
+    assert "GPS time is 18 s, the leap seconds, ahead of UTC" in finding.sentence
+    assert "leap" not in found(offset, *drive(6.0)[:1], "clock offset", drive(6.0)[1]).sentence
+
+
 def test_what_cannot_be_told_is_said() -> None:
     events, track = drive(0.0)
     t_s = np.arange(0, 240.0)

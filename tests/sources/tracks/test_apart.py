@@ -117,7 +117,7 @@ def test_a_log_without_dates_over_midnight(tmp_path: Path, before_s: int) -> Non
     log.t_s = midnight_s - before_s + np.arange(200.0)
     text = "\n".join(sentence(gga_body(t, lat, lon)) for t, lat, lon, _, _ in log.rows())
     bare = open_track(written(tmp_path, text))
-    for first_s in (log.t_s[0], midnight_s - 1, midnight_s + 5, log.t_s[-1]):
+    for first_s in (log.t_s[0] - 100, log.t_s[0], midnight_s - 1, midnight_s + 5, log.t_s[-1] + 100):
         assert on_day_of(bare, int(first_s * 1e6)).t_us[0] == round(log.t_s[0] * 1e6)
 
 

@@ -179,6 +179,16 @@ def test_the_unit_of_the_logs_own_speed_is_found(tmp_path: Path, factor: float) 
     assert track.dropped == {"repeated while moving": 49}
 
 
+@pytest.mark.parametrize("factor", [3600 / 1852, 3.6, 2.2369])
+def test_the_log_goes_no_faster_than_it_says(tmp_path: Path, factor: float) -> None:
+    """A jump aside that the fastest speed allows, but not the log's own."""
+    log = Log()
+    aside(60, 50, 60)(log)
+    rows = [f"{t * 1e6:.0f},{lat:.8f},{lon:.8f},{mps * factor:.3f}" for t, lat, lon, mps, _ in log.rows()]
+    track = open_track(written(tmp_path, "\n".join(["timestamp,latitude,longitude,speed", *rows])))
+    assert track.dropped == {"against the log's own speed": 10}
+
+
 @pytest.mark.parametrize("speed", [0.0, 900.0])
 def test_speeds_that_do_not_fit_are_not_used(tmp_path: Path, speed: float) -> None:
     log = Log()

@@ -56,7 +56,6 @@ def possible(fixes: Fixes, max_speed_mps: float) -> Fixes:
 
     Raises TrackError where fewer than half can be.
     """
-    fixes = fixes.without(_same(fixes), "duplicate time")
     speed = own_speed(fixes)
     frozen = _frozen(fixes, speed) | _held(fixes, max_speed_mps)
     fixes, speed = fixes.without(frozen, "repeated while moving"), speed[~frozen]
@@ -112,12 +111,6 @@ def _summed(steps: NDArray[Any]) -> NDArray[Any]:
     return np.concatenate([np.zeros_like(steps, shape=(1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
 
 
-def _same(fixes: Fixes) -> Bools:
-    """(N,) which fixes say again what the one before them said."""
-    step_m, step_s = _steps(fixes)
-    return np.concatenate([[False], (step_s == 0) & (step_m <= SLACK_M)])
-
-
 def _frozen(fixes: Fixes, speed: Floats) -> Bools:
     """(N,) which fixes are where the receiver was a second before, although the log's own speed says no."""
     assert fixes.xy is not None
@@ -155,7 +148,7 @@ class Way(NamedTuple):
     """How a vehicle must have moved by the log's own speed and course, else by the steps around each fix."""
 
     xy: Floats
-    """(N, 2) metres since the first fix; NaN where no course is known."""
+    """(N, 2) metres since the first fix."""
     metres: Floats
     """(N,) the length of the way since the first fix."""
     unknown: NDArray[np.int64]
@@ -167,21 +160,25 @@ class Way(NamedTuple):
 def _way(fixes: Fixes, speed: Floats) -> Way:
     step_s = np.diff(fixes.t_us) / 1e6
     own = bool(np.isfinite(speed).any())
-    course = np.deg2rad(np.where(speed > MOVING_MPS, fixes.heading_deg, 0.0))
-    velocity = speed[:, None] * np.column_stack([np.sin(course), np.cos(course)])
-    if not own:
-        velocity = _around(fixes)
-        speed = np.hypot(*velocity.T)
-    elif not _fits(velocity, fixes):
-        velocity = np.full_like(velocity, np.nan)
-    unknown = ~((step_s <= NEAR_US / 1e6) & np.isfinite(speed[1:] + speed[:-1]))
-    moved = np.where(np.isfinite(velocity).any(), _between(velocity, step_s), np.nan)
+    velocity = _velocity(fixes, speed) if own else _around(fixes)
+    known = (step_s <= NEAR_US / 1e6) & np.isfinite(velocity[1:] + velocity[:-1]).all(axis=1)
     return Way(
-        _summed(moved),
-        _summed(_between(speed, step_s)),
-        _summed(unknown.astype(np.int64)),
+        _summed(_between(velocity, step_s)),
+        _summed(_between(np.hypot(*velocity.T), step_s)),
+        _summed((~known).astype(np.int64)),
         OWN_SLACK_M if own else STEPS_SLACK_M,
     )
+
+
+def _velocity(fixes: Fixes, speed: Floats) -> Floats:
+    """(N, 2) metres a second by the log's own speed and course, or along the steps where it has no course."""
+    course = np.deg2rad(np.where(speed > MOVING_MPS, fixes.heading_deg, 0.0))
+    own: Floats = speed[:, None] * np.column_stack([np.sin(course), np.cos(course)])
+    if _fits(own, fixes):
+        return own
+    around = _around(fixes)
+    along: Floats = around / np.maximum(np.hypot(*around.T), 1e-9)[:, None]
+    return np.asarray(along * speed[:, None], np.float64)
 
 
 def _fits(own: Floats, fixes: Fixes) -> bool:
@@ -288,11 +285,8 @@ def _reachable(
     way = way_m[j] - way_m[i]
     if span_s > FAR_S or unknown[j] > unknown[i] or way <= MOVING_MPS * span_s:
         return True
-    may_m = slack_m + DRIFT_MPS * span_s
-    if np.isnan(way_xy[j, 0]):
-        return bool(metres <= way + may_m)
-    moved = (xy[j] - xy[i]) - (way_xy[j] - way_xy[i])
-    return bool(np.hypot(moved[0], moved[1]) <= may_m)
+    off = (xy[j] - xy[i]) - (way_xy[j] - way_xy[i])
+    return bool(np.hypot(off[0], off[1]) <= slack_m + DRIFT_MPS * span_s)
 
 
 @njit(cache=True)

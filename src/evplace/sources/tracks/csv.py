@@ -149,7 +149,7 @@ def _named(header: list[str], settings: Settings) -> tuple[Settings, list[str]]:
             found = [lower[name] for name in (default, *_OTHER_NAMES[default]) if name in lower]
             if found:
                 chosen[field] = found[0]
-    notes = [f"the column '{name}' is taken for the {field}" for field, name in chosen.items()]
+    notes = [f"the column '{shown(name)}' is taken for the {field}" for field, name in chosen.items()]
     return replace(settings, **chosen), notes  # type: ignore[arg-type]  # all of them are names
 
 
@@ -233,9 +233,9 @@ def _clock(
     numbers = [number(text) for text in texts if _is(number, text)]
     told = dated_unit(numbers)
     if told not in (None, "us"):
-        notes.append(f"the times of the column '{name}' are taken in {told}, in which they are dates")
+        notes.append(f"the times of the column '{shown(name)}' are taken in {told}, in which they are dates")
     if told is None and numbers:
-        notes.append(f"the times of the column '{name}' are no dates: they are taken in us")
+        notes.append(f"the times of the column '{shown(name)}' are no dates: they are taken in us")
     chosen = told or "us"
     return (lambda row: number_us(row[name], chosen)), chosen
 
