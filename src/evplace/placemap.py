@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from evplace import places as places_of
 from evplace.core import families
-from evplace.core.errors import EvplaceError, InputError, PlaceMapError
+from evplace.core.errors import EvplaceError, InputError, PartError, PlaceMapError
 from evplace.core.settings import to_dict
 from evplace.core.storage import new_folder, read_array, read_json, sha256, write_json
 from evplace.drives.to_traverse import open_traverse
@@ -216,6 +216,7 @@ def train(
     drive = np.column_stack([reference.xy, heading])
     with families.blaming("scorers", part):
         learned = scorer_of(part).learn(reference, places, learning or Learning())
+    _check_learned(learned, len(reference), part)
     return PlaceMap(
         part,
         places,
@@ -226,6 +227,39 @@ def train(
         reference.recipe,
         (track.zone, track.northern) if track is not None else None,
         {key: reference.info[key] for key in ("source", "spacing") if key in reference.info},
+    )
+
+
+def _check_learned(learned: object, images: int, part: object) -> None:
+    """PartError where a scorer has learned something that no map can hold."""
+    fault = (
+        _fault_of(learned, images) if isinstance(learned, Learned) else f"it gave {type(learned).__name__}"
+    )
+    if fault is not None:
+        raise PartError(
+            f"{families.described('scorers', part)} must learn arrays and bytes, and which images its items "
+            f"are: {fault}"
+        )
+
+
+def _fault_of(learned: Learned, images: int) -> str | None:
+    content: object = learned.content
+    if not isinstance(content, Mapping):
+        return f"its content is {type(content).__name__}"
+    odd = [type(value).__name__ for value in content.values() if not isinstance(value, np.ndarray | bytes)]
+    if odd:
+        return f"its content holds {odd[0]}"
+    if learned.images is not None and not _are_indices(learned.images, images):
+        return f"its items are not some of the {images} images"
+    return None
+
+
+def _are_indices(chosen: object, images: int) -> bool:
+    return (
+        isinstance(chosen, np.ndarray)
+        and chosen.ndim == 1
+        and chosen.dtype.kind in "iu"
+        and bool(np.all((chosen >= 0) & (chosen < images)))
     )
 
 
@@ -253,6 +287,12 @@ def _scorer_from(values: Mapping[str, Any], what: str) -> Scorer | Descriptor:
         raise PlaceMapError(
             f"{what} wants the scorer '{name}' of the package '{package}', which is not installed: install "
             "it, or hand the scorer in: PlaceMap.load(path, scorer)"
+        )
+    found = families.package_of(families.load("scorers", name))
+    if package is not None and found != package:
+        raise PlaceMapError(
+            f"{what} wants the scorer '{name}' of the package '{package}', but the one installed is of "
+            f"'{found}': hand the right one in: PlaceMap.load(path, scorer)"
         )
     part: Scorer | Descriptor = families.make("scorers", name, values=values["settings"])
     return part

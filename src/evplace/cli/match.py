@@ -19,7 +19,9 @@ from typing import Annotated, ClassVar
 import tyro
 
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
-from evplace.matchers import _files, open_matcher
+from evplace.core import families
+from evplace.matchers import Matcher, _files
+from evplace.matchers._checks import check_path
 
 
 @dataclass(frozen=True)
@@ -48,13 +50,16 @@ class Args(SettingsFlags):
 
 def run(args: Args) -> int:
     """Match the whole matrix, a block of rows at a time; 0, or an EvplaceError."""
-    matcher = open_matcher(args.matcher, args.preset, args.distances, **dict(args.set))
+    matcher: Matcher = families.make("matchers", args.matcher, args.preset, dict(args.set))
     table = _files.open_scores(args.scores)
-    for rows in _files.score_blocks(table, args.distances):
-        matcher.extend(rows)
-    matches = matcher.path()
-    _files.write_matches(args.output, matches, args.overwrite)
     queries, references = table.shape
+    with families.blaming("matchers", matcher):
+        matching = matcher.start(args.distances)
+        for rows in _files.score_blocks(table, args.distances):
+            matching.extend(rows)
+        matches = matching.path()
+    check_path(matches, queries, references, matcher)
+    _files.write_matches(args.output, matches, args.overwrite)
     figures = {"queries": queries, "references": references, "accepted": int(matches.accepted.sum())}
     if args.json:
         print(json.dumps(figures))

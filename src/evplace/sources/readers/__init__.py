@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from evplace.core import families
-from evplace.core.errors import RecordingError
+from evplace.core.errors import EvplaceError, RecordingError
 from evplace.core.events import Size
-from evplace.sources.readers._source import Block, Hints, Source
+from evplace.sources.readers._source import Block, Hints, Source, checked_source
 
 if TYPE_CHECKING:
     from evplace.sources.readers._recording import Recording
@@ -54,10 +54,11 @@ def open_recording(
     name = _found(file, head) if format is None else format
     reader = families.load("readers", name)
     try:
-        source: Source = reader.read(file, Hints(size, time_unit))
+        with families.blaming("readers", reader, OSError):
+            source: Source = reader.read(file, Hints(size, time_unit))
     except OSError as error:
         raise RecordingError(f"cannot read {file} as {name}: {error.strerror or error}") from error
-    return Recording(file, name, source, size)
+    return Recording(file, name, checked_source(source, "readers", reader), size)
 
 
 def __getattr__(name: str) -> Any:
@@ -94,9 +95,10 @@ def _head(path: Path) -> bytes:
 
 def _found(path: Path, head: bytes) -> str:
     """The name of the first reader that knows the content."""
-    known = families.names("readers")
-    for name in known:
-        if families.load("readers", name).matches(path, head):
-            return name
-    what = "the folder" if path.is_dir() else "the content"
-    raise RecordingError(f"{path}: {what} is of no known recording format: known are {', '.join(known)}")
+    faults: list[EvplaceError] = []
+    for name in families.recognising("readers", lambda reader: reader.matches(path, head), faults):
+        return name
+    known, what = ", ".join(families.names("readers")), "the folder" if path.is_dir() else "the content"
+    raise RecordingError(
+        f"{path}: {what} is of no known recording format: known are {known}{families.besides(faults)}"
+    )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from evplace.core.errors import DamagedRecordingError, RecordingError
 from evplace.core.events import Events, Size
 from evplace.sources.readers._checks import NOTHING_YET, REASONS, checked
-from evplace.sources.readers._source import Block, Source, joined
+from evplace.sources.readers._source import Block, Source, checked_source, joined
 
 PACKET = 1_000_000
 """Events in a packet at most."""
@@ -74,6 +74,10 @@ class Recording:
             yield from self._delivered(good)
         if fault is not None:
             raise fault
+
+    def hold(self, family: str, part: object) -> None:
+        """Name `part`, which made this recording's source, where that breaks what it promises."""
+        self._source = checked_source(self._source, family, part)
 
     @property
     def states_size(self) -> bool:

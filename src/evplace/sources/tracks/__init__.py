@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from evplace.core import families, settings
-from evplace.core.errors import TrackError
+from evplace.core.errors import EvplaceError, TrackError
 from evplace.sources.tracks._fixes import Fixes
 from evplace.sources.tracks._track import Track
 
@@ -40,8 +40,10 @@ def open_track(
     name = format_of(path)
     kind, presets = families.settings_of("tracks", name)
     chosen = settings.make(kind, values, settings.preset_of(f"the track format '{name}'", presets, preset))
+    part = families.load("tracks", name)
     try:
-        fixes: Fixes = families.load("tracks", name).read(path, chosen)
+        with families.blaming("tracks", part, OSError):
+            fixes: Fixes = part.read(path, chosen)
         return Track.of(fixes, offset_us, zone, northern)
     except TrackError as error:
         raise TrackError(f"{path}: {error}") from error
@@ -56,8 +58,10 @@ def format_of(path: Path) -> str:
         raise TrackError(f"cannot read the GPS log {path}: {error.strerror}") from error
     if not head.strip():
         raise TrackError(f"{path} is empty: give a GPS log with fixes in it")
-    known = families.names("tracks")
-    for name in known:
-        if families.load("tracks", name).recognises(head):
-            return name
-    raise TrackError(f"{path} is no GPS log that is known here: give one of {', '.join(known)}")
+    faults: list[EvplaceError] = []
+    for name in families.recognising("tracks", lambda part: part.recognises(head), faults):
+        return name
+    known = ", ".join(families.names("tracks"))
+    raise TrackError(
+        f"{path} is no GPS log that is known here: give one of {known}{families.besides(faults)}"
+    )
