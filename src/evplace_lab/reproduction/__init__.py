@@ -1,10 +1,10 @@
 """The paper's comparison on the benchmark city and on real sets: from recipes to documents.
 
 One file a table or figure; its name is what users ask for. Each holds NEEDS (city or data), INPUTS (those
-that it can be limited to; empty for none), METHODS (those beside which further ones can stand; empty where none
-can), `cases(drives, choice)` (all that must be run), `collect(drives, runs, choice)` (the document, as plain
-values), and `tables(document)` (the same for people). What was run is kept by its settings in the output folder,
-so that a second call, another table or a killed call runs only what is missing.
+that it can be limited to; empty for none), METHODS (those beside which further ones can stand; empty where
+none can), `cases(drives, choice)` (all that must be run), `collect(drives, runs, choice)` (the document, as
+plain values), and `tables(document)` (the same for people). What was run is kept by its settings in the
+output folder, so that a second call, another table or a killed call runs only what is missing.
 """
 
 from __future__ import annotations
