@@ -21,7 +21,7 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places scorers placemap matchers localizer evaluation doctor cli"
+        "core sources imaging drives places scorers placemap matchers localizer evaluation doctor testing cli"
     ),
     "evplace.core": "errors events grey settings families storage workers drawing",
     "evplace.sources": "frames readers writers cleaning tracks film simulators",

@@ -23,6 +23,7 @@ from evplace.imaging.recipe import shown
 from evplace.imaging.stream import EventImage, EventImages
 from evplace.imaging.traverse import Traverse
 from evplace.matchers import Answer, Matcher, Matching, Path, stepped
+from evplace.matchers._checks import check_answer, check_path
 from evplace.placemap import PlaceMap
 from evplace.scorers import OpenScorer, Rows, scorer_of
 from evplace.sources.cleaning import MaskSource, read_mask
@@ -86,6 +87,7 @@ class Localizer:
         """Pixels of the drive to leave out; it counts from the first packet of a drive."""
         with families.blaming("scorers", place_map.scorer):
             self.scorer: OpenScorer = scorer_of(place_map.scorer).open(place_map.content)
+            self._distances = bool(self.scorer.distances)
         self.reset()
 
     @property
@@ -96,7 +98,8 @@ class Localizer:
     def reset(self) -> None:
         """Forget the drive so far."""
         with families.blaming("matchers", self.matcher):
-            self._matching: Matching = self.matcher.start(self.scorer.distances)
+            self._matching: Matching = self.matcher.start(self._distances)
+        self._stepped = 0
         self._images: EventImages | None = None
         self._times_us: list[int] = []
 
@@ -180,17 +183,14 @@ class Localizer:
         with families.blaming("matchers", self.matcher):
             self._matching.extend(rows)
             found = self._matching.path()
-        check_path(found, len(rows), self.map, self.matcher)
+        check_path(found, len(rows), len(self.map.items), self.matcher)
         return found, max(0, len(rows) - 1)
 
     def _step(self, row: Rows) -> Answer | None:
         with families.blaming("matchers", self.matcher):
             answer = self._matching.step(row)
-        if answer is not None and not -1 <= answer.item < len(self.map.items):
-            raise PartError(
-                f"{families.described('matchers', self.matcher)} answered item {answer.item} of a map of "
-                f"{len(self.map.items)} items"
-            )
+        self._stepped += 1
+        check_answer(answer, self._stepped, len(self.map.items), self.matcher)
         return answer
 
     def _matches_of(self, image: EventImage) -> Iterator[Match]:
@@ -225,25 +225,16 @@ class Localizer:
 def check_rows(rows: object, images: int, place_map: PlaceMap) -> None:
     """PartError where a scorer gives anything but finite (images, items) scores."""
     wanted = (images, len(place_map.items))
-    if isinstance(rows, np.ndarray) and rows.shape == wanted and np.isfinite(rows).all():
-        return
-    kind = f"{rows.dtype} {rows.shape}" if isinstance(rows, np.ndarray) else type(rows).__name__
-    unfinite = " with NaN or infinity" if isinstance(rows, np.ndarray) and rows.shape == wanted else ""
+    kind, unfinite = type(rows).__name__, ""
+    if isinstance(rows, np.ndarray):
+        kind = f"{rows.dtype} {rows.shape}"
+        if rows.shape == wanted and rows.dtype.kind in "fiu":
+            if np.isfinite(rows).all():
+                return
+            unfinite = " with NaN or infinity"
     raise PartError(
         f"{families.described('scorers', place_map.scorer)} must give finite scores {wanted} for {images} "
         f"images and {wanted[1]} items, it gave {kind}{unfinite}"
-    )
-
-
-def check_path(found: Path, queries: int, place_map: PlaceMap, matcher: Matcher) -> None:
-    """PartError where a matcher's path is not one answer a query, of the map's items."""
-    shapes = {np.shape(column) for column in found}
-    item = np.asarray(found.item)
-    if shapes == {(queries,)} and np.all((item >= -1) & (item < len(place_map.items))):
-        return
-    raise PartError(
-        f"{families.described('matchers', matcher)} must answer each of {queries} queries with an item of "
-        f"{len(place_map.items)} or -1, its answers have the shapes {sorted(shapes)}"
     )
 
 

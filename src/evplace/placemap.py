@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from evplace import places as places_of
 from evplace.core import families
-from evplace.core.errors import EvplaceError, InputError, PlaceMapError
+from evplace.core.errors import EvplaceError, InputError, PartError, PlaceMapError
 from evplace.core.settings import to_dict
-from evplace.core.storage import new_folder, read_array, read_json, sha256, write_json
+from evplace.core.storage import new_folder, read_array, read_bytes, read_json, sha256, write_json
 from evplace.drives.to_traverse import open_traverse
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import MARK as TRAVERSE
@@ -222,6 +222,7 @@ def train(
     drive = np.column_stack([reference.xy, heading])
     with families.blaming("scorers", part):
         learned = scorer_of(part).learn(reference, places, learning or Learning())
+    _check_learned(learned, len(reference), part)
     return PlaceMap(
         part,
         places,
@@ -232,6 +233,39 @@ def train(
         reference.recipe,
         (track.zone, track.northern) if track is not None else None,
         {key: reference.info[key] for key in ("source", "spacing") if key in reference.info},
+    )
+
+
+def _check_learned(learned: object, images: int, part: object) -> None:
+    """PartError where a scorer has learned something that no map can hold."""
+    fault = (
+        _fault_of(learned, images) if isinstance(learned, Learned) else f"it gave {type(learned).__name__}"
+    )
+    if fault is not None:
+        raise PartError(
+            f"{families.described('scorers', part)} must learn arrays and bytes, and which images its items "
+            f"are: {fault}"
+        )
+
+
+def _fault_of(learned: Learned, images: int) -> str | None:
+    content: object = learned.content
+    if not isinstance(content, Mapping):
+        return f"its content is {type(content).__name__}"
+    odd = [type(value).__name__ for value in content.values() if not isinstance(value, np.ndarray | bytes)]
+    if odd:
+        return f"its content holds {odd[0]}"
+    if learned.images is not None and not _are_indices(learned.images, images):
+        return f"its items are not some of the {images} images"
+    return None
+
+
+def _are_indices(chosen: object, images: int) -> bool:
+    return (
+        isinstance(chosen, np.ndarray)
+        and chosen.ndim == 1
+        and chosen.dtype.kind in "iu"
+        and bool(np.all((chosen >= 0) & (chosen < images)))
     )
 
 
@@ -259,6 +293,12 @@ def _scorer_from(values: Mapping[str, Any], what: str) -> Scorer | Descriptor:
         raise PlaceMapError(
             f"{what} wants the scorer '{name}' of the package '{package}', which is not installed: install "
             "it, or hand the scorer in: PlaceMap.load(path, scorer)"
+        )
+    found = families.package_of(families.load("scorers", name))
+    if package is not None and found != package:
+        raise PlaceMapError(
+            f"{what} wants the scorer '{name}' of the package '{package}', but the one installed is of "
+            f"'{found}': hand the right one in: PlaceMap.load(path, scorer)"
         )
     part: Scorer | Descriptor = families.make("scorers", name, values=values["settings"])
     return part
@@ -290,7 +330,10 @@ def _about(folder: Path, what: str) -> dict[str, Any]:
         raise PlaceMapError(f"{what} is damaged: {zone!r} is no UTM zone")
     if not isinstance(scorer.get("name"), str) or not isinstance(scorer.get("settings"), dict):
         raise PlaceMapError(f"{what} is damaged: its scorer is {scorer!r}")
-    if not all(isinstance(name, str) and _NAME.fullmatch(name) for name in about["content"]):
+    names = about["content"]
+    if not all(isinstance(name, str) and _may_be_called(name) for name in names) or len(set(names)) < len(
+        names
+    ):
         raise PlaceMapError(f"{what} is damaged: its content is {about['content']!r}")
     return about
 
@@ -336,7 +379,13 @@ def _check_fit(place_map: PlaceMap, what: str) -> None:
     if items.place.max() >= places.n:
         raise PlaceMapError(f"{what} is damaged: an item of place {items.place.max()} of {places.n}")
     drive = place_map.drive
-    if drive.ndim != 2 or drive.shape[1] != 3 or drive.dtype != np.float64 or np.isinf(drive).any():
+    if (
+        drive.ndim != 2
+        or drive.shape[1] != 3
+        or not len(drive)
+        or drive.dtype != np.float64
+        or np.isinf(drive).any()
+    ):
         raise PlaceMapError(f"{what} is damaged: its drive is {drive.dtype} {drive.shape}")
     if np.isinf(items.position).any() or np.isinf(items.heading_deg).any():
         raise PlaceMapError(f"{what} is damaged: its items lie at infinity")
@@ -352,9 +401,13 @@ def _check_fit(place_map: PlaceMap, what: str) -> None:
 
 def _file_of(name: str, value: NDArray[Any] | bytes) -> str:
     file = name if isinstance(value, bytes) else f"{name}.npy"
-    if not _NAME.fullmatch(file) or file in (MARK, "items.npy", "drive.npy"):
+    if not _may_be_called(file):
         raise PlaceMapError(f"a scorer cannot call its content '{name}': lower-case letters and one suffix")
     return file
+
+
+def _may_be_called(file: str) -> bool:
+    return _NAME.fullmatch(file) is not None and file not in (MARK, "items.npy", "drive.npy")
 
 
 def _write_content(folder: Path, name: str, value: NDArray[Any] | bytes) -> None:
@@ -374,9 +427,9 @@ def _read(file: Path, what: str) -> NDArray[Any] | bytes:
 def _check_sums(folder: Path, what: str, needed: set[str]) -> None:
     """PlaceMapError where SHA256SUMS does not name just the files that are read, or a byte has changed."""
     try:
-        lines = (folder / SUMS).read_text("ascii").splitlines()
+        lines = read_bytes(folder / SUMS, what).decode("ascii").splitlines()
         sums = {name: wanted for wanted, name in (line.split("  ", 1) for line in lines)}
-    except (OSError, ValueError) as error:
+    except (InputError, ValueError) as error:
         raise PlaceMapError(f"{what} has no readable {SUMS}: train it again ({error})") from error
     for name in sorted(needed | set(sums)):
         file = folder / name

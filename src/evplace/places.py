@@ -148,18 +148,16 @@ class PlaceGrid:
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """The grid that `to_dict` wrote; PlaceMapError where it is damaged."""
-        try:
-            cells = np.array(values["cells"], np.int64).reshape(-1, 2)
-            x, y = (float(value) for value in values["origin"])
-            grid = cls(cells, float(values["cell_m"]), (x, y), int(values["zone"]), bool(values["northern"]))
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            raise PlaceMapError(
-                f"the places of the map are damaged ({error!r}): make the map again"
-            ) from error
-        if not (grid.n and grid.cell_m > 0 and len(np.unique(cells, axis=0)) == grid.n):
-            raise PlaceMapError(
-                "the places of the map are damaged (empty or double cells): make the map again"
-            )
+        cells, origin = np.array(_of(values, "cells", list), object), _of(values, "origin", list)
+        if cells.ndim != 2 or cells.shape[1] != 2 or not all(_is_cell(cell) for cell in cells.reshape(-1)):
+            raise _damaged("'cells' are no list of pairs of whole numbers")
+        cell_m, zone = _number(_of(values, "cell_m", int, float)), _of(values, "zone", int)
+        if len(origin) != 2 or not cell_m > 0 or not 0 <= zone <= 60:
+            raise _damaged(f"cells of {cell_m} m from {origin!r} in zone {zone}")
+        x, y = map(_number, origin)
+        grid = cls(cells.astype(np.int64), cell_m, (x, y), zone, _of(values, "northern", bool))
+        if len(np.unique(grid.cells, axis=0)) != grid.n:
+            raise _damaged("double cells")
         return grid
 
     def _place_of(self, cells: Ints) -> Ints:
@@ -239,12 +237,13 @@ class PlaceRuns:
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
         """The runs that `to_dict` wrote; PlaceMapError where they are damaged."""
+        n_images, every, tolerance = (_of(values, name, int) for name in ("n_images", "every", "tolerance"))
+        if max(n_images, every, tolerance) > _REACH:
+            raise _damaged(f"{n_images} images in places of {every}")
         try:
-            return cls(int(values["n_images"]), int(values["every"]), int(values["tolerance"]))
-        except (KeyError, TypeError, ValueError, SettingsError) as error:
-            raise PlaceMapError(
-                f"the places of the map are damaged ({error!r}): make the map again"
-            ) from error
+            return cls(n_images, every, tolerance)
+        except SettingsError as error:
+            raise _damaged(str(error)) from error
 
 
 def from_dict(values: Mapping[str, Any]) -> PlaceGrid | PlaceRuns:
@@ -256,6 +255,28 @@ def from_dict(values: Mapping[str, Any]) -> PlaceGrid | PlaceRuns:
             return PlaceRuns.from_dict(values)
         case other:
             raise PlaceMapError(f"the map's places are of the kind {other!r}: known are 'grid' and 'runs'")
+
+
+def _damaged(why: str) -> PlaceMapError:
+    return PlaceMapError(f"the places of the map are damaged ({why}): make the map again")
+
+
+def _of(values: Mapping[str, Any], name: str, *kinds: type) -> Any:
+    """The entry of that name; PlaceMapError where it is missing or of none of the kinds."""
+    if type(values.get(name)) not in kinds:
+        raise _damaged(f"'{name}' is missing or of a wrong kind")
+    return values[name]
+
+
+def _number(value: object) -> float:
+    """A finite number as a float; PlaceMapError where it is none."""
+    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < 1e12:
+        raise _damaged(f"{value!r} metres")
+    return float(value)
+
+
+def _is_cell(value: object) -> bool:
+    return type(value) is int and abs(value) < _REACH
 
 
 def _cells(xy: ArrayLike, cell_m: float, origin: tuple[float, float]) -> tuple[Ints, Bools]:

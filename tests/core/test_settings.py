@@ -65,7 +65,7 @@ def test_files(tmp_path: Path) -> None:
 
 
 def test_families_are_their_folders() -> None:
-    assert families.names("scorers") == ["cosine", "ncc", "network", "notebook", "sad", "seqslam"]
+    assert {"cosine", "ncc", "network", "notebook", "sad", "seqslam"} <= set(families.names("scorers"))
     assert families.load("scorers", "ncc").__name__ == "NCC"
     assert families.load("tracks", "csv").__name__ == "evplace.sources.tracks.csv"
     with pytest.raises(SettingsError, match="known are cosine"):

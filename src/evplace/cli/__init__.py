@@ -15,9 +15,10 @@ import sys
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from evplace.cli._output import note
-from evplace.core.errors import EvplaceError
+from evplace.core.errors import EvplaceError, PartError
 
 INTERRUPTED = 130
 
@@ -65,7 +66,7 @@ def _run(arguments: list[str]) -> int:
         close = difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean '{close[0]}'? " if close else ""
         raise EvplaceError(f"unknown command '{name}': {hint}commands are {', '.join(known)}")
-    module = importlib.import_module(_modules()[name])
+    module = _loaded(name)
     from evplace.cli._parse import parse
 
     parsed = parse(module, name, arguments[1:])
@@ -92,9 +93,22 @@ def _overview(known: dict[str, str]) -> str:
     )
 
 
+def _loaded(name: str) -> Any:
+    module = _modules()[name]
+    try:
+        return importlib.import_module(module)
+    except Exception as error:
+        if module.startswith("evplace"):
+            raise
+        raise PartError(f"the command '{name}' cannot be loaded: {type(error).__name__}: {error}") from error
+
+
 def _summary(module: str) -> str:
-    spec = find_spec(module)
-    assert spec is not None
-    assert spec.origin is not None
-    docstring = ast.get_docstring(ast.parse(Path(spec.origin).read_text("utf-8"))) or ""
-    return docstring.splitlines()[0].rstrip(".")
+    try:
+        spec = find_spec(module)
+        if spec is None or spec.origin is None:
+            return "cannot be loaded"
+        docstring = ast.get_docstring(ast.parse(Path(spec.origin).read_text("utf-8"))) or ""
+    except (ImportError, OSError, ValueError, SyntaxError):  # another package's, which is broken
+        return "cannot be loaded"
+    return docstring.partition("\n")[0].rstrip(".")

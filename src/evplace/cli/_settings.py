@@ -60,7 +60,7 @@ def a_preset_of(family: str | Mapping[str, object]) -> object:
 def _presets_of(family: str) -> list[str]:
     """The presets of a family's parts, each with its part: `paper (local)`."""
     parts: dict[str, list[str]] = {}
-    for name in families.names(family):
+    for name, _ in families.loadable(family):
         for preset in families.settings_of(family, name)[1]:
             parts.setdefault(preset, []).append(name)
     return [f"{preset} ({', '.join(names)})" for preset, names in sorted(parts.items())]

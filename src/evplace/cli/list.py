@@ -1,4 +1,4 @@
-"""What there is to choose from: recording formats, track formats, data sets, scorers, matchers.
+"""What there is to choose from: recording formats, track formats, data sets, scorers, matchers and so on.
 
 Examples:
   evplace list
@@ -16,7 +16,9 @@ import tyro
 from evplace.cli._output import print_facts, print_json
 from evplace.core import families
 
-Family = Literal["readers", "writers", "tracks", "datasets", "representations", "scorers", "matchers"]
+Family = Literal[
+    "readers", "writers", "tracks", "datasets", "representations", "scorers", "matchers", "doctor"
+]
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from evplace.cli._output import note
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.core import families
 from evplace.matchers import Matcher, _files
+from evplace.matchers._checks import check_path
 from evplace.matchers._look import ScoreLook
 
 
@@ -54,19 +55,21 @@ class Args(SettingsFlags):
 
 def run(args: Args) -> int:
     """Match the whole matrix, a block of rows at a time; 0, or an EvplaceError."""
-    part: Matcher = families.make("matchers", args.matcher, args.preset, dict(args.set))
-    matcher = part.start(args.distances)
+    matcher: Matcher = families.make("matchers", args.matcher, args.preset, dict(args.set))
     table = _files.open_scores(args.scores)
     if args.layout == "reference-query":
         table = table.T
     look = ScoreLook(args.distances)
-    for rows in _files.score_blocks(table, args.distances):
-        look.see(rows)
-        matcher.extend(rows)
-    matches = matcher.path()
-    remarks = look.remarks(part, matches)
-    _files.write_matches(args.output, matches, args.overwrite)
     queries, references = table.shape
+    with families.blaming("matchers", matcher):
+        matching = matcher.start(args.distances)
+        for rows in _files.score_blocks(table, args.distances):
+            look.see(rows)
+            matching.extend(rows)
+        matches = matching.path()
+    check_path(matches, queries, references, matcher)
+    remarks = look.remarks(matcher, matches)
+    _files.write_matches(args.output, matches, args.overwrite)
     figures = {"queries": queries, "references": references, "accepted": int(matches.accepted.sum())}
     if args.layout is None:
         note("rows are taken for queries, columns for references: --layout reference-query turns them")

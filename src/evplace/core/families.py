@@ -12,7 +12,7 @@ import functools
 import importlib
 import inspect
 import pkgutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, NamedTuple
@@ -78,12 +78,34 @@ def class_called(family: str, name: str) -> Any:
 
 
 def loadable(family: str) -> Iterator[tuple[str, Any]]:
-    """Name and part of all that can be loaded: one that cannot does not stop the others."""
-    for name in names(family):
+    """Name and part of all that can be loaded, our own first: one that cannot does not stop the others."""
+    for name in [*_own(family), *sorted(_others(family))]:
         try:
             yield name, load(family, name)
         except PartError:
             continue
+
+
+def recognising(family: str, asks: Callable[[Any], bool], faults: list[EvplaceError]) -> Iterator[str]:
+    """The names of the parts that `asks` is true of, our own first.
+
+    One that cannot be loaded, or fails, stops no other; why it did goes into `faults`.
+    """
+    for name in [*_own(family), *sorted(_others(family))]:
+        try:
+            part = load(family, name)
+            with blaming(family, part):
+                found = asks(part)
+        except EvplaceError as error:
+            faults.append(error)
+            continue
+        if found:
+            yield name
+
+
+def besides(faults: Sequence[EvplaceError]) -> str:
+    """What is added to "nothing recognises it" where some parts could not say."""
+    return f"; besides, {faults[0]}" if faults else ""
 
 
 def make(family: str, given: object, preset: str | None = None, values: Mapping[str, object] = {}) -> Any:
@@ -111,34 +133,39 @@ def settings_of(family: str, name: str) -> tuple[type[Any], Mapping[str, Any]]:
 
 
 def name_of(family: str, part: object) -> str:
-    """The name of an object's class in its family; the class's own name where it is in none."""
-    kind = type(part)
-    folder, _, file = kind.__module__.rpartition(".")
+    """The name of a module, a class, or an object's class in its family; its own name where it is in none."""
+    module, kind = _origin(part)
+    folder, _, file = module.rpartition(".")
     if folder == _folder(family):
-        return file.replace("_", "-")
+        return file.replace("_", "-") if family in CLASSES else file
     for name, entry in _others(family).items():
-        if entry.value == f"{kind.__module__}:{kind.__qualname__}":
+        if entry.module == module and entry.attr in (None, kind):  # None: the part is the module itself
             return name
-    return kind.__qualname__
+    return kind or file
 
 
 def package_of(part: object) -> str:
-    """The package that an object's class, a class, or a module comes from."""
-    module = part.__name__ if inspect.ismodule(part) else getattr(part, "__module__", type(part).__module__)
-    return str(module).partition(".")[0]
+    """The package that a module, a class, or an object's class comes from."""
+    return _origin(part)[0].partition(".")[0]
 
 
 def entries(family: str) -> list[Entry]:
-    """All parts of a family as a list shows them, with those that cannot be loaded and why."""
-    return [_entry(family, name) for name in names(family)]
+    """All parts of a family as a list shows them, with those that cannot be loaded or are hidden, and why."""
+    return [_entry(family, name) for name in names(family)] + [
+        _hidden_entry(family, entry) for entry in _entry_points(family)[1]
+    ]
 
 
 @contextmanager
-def blaming(family: str, part: object) -> Iterator[None]:
-    """Whatever another package's part raises within the block becomes one PartError that names it."""
+def blaming(family: str, part: object, *passed: type[Exception]) -> Iterator[None]:
+    """Whatever another package's part raises within the block becomes one PartError that names it.
+
+    Errors that evplace raises on purpose stay as they are, and those of the kinds `passed`.
+    """
+    ours: tuple[type[Exception], ...] = (EvplaceError, *passed)
     try:
         yield
-    except EvplaceError:
+    except ours:
         raise
     except Exception as error:
         if package_of(part).startswith(OURS):
@@ -166,11 +193,30 @@ def _own(family: str) -> tuple[str, ...]:
     return tuple(sorted(name.replace("_", "-") if family in CLASSES else name for name in public))
 
 
-@functools.cache
 def _others(family: str) -> dict[str, EntryPoint]:
-    """Parts of other packages; a name of our own is ours."""
-    found = entry_points(group=f"evplace.{family}")
-    return {entry.name: entry for entry in found if entry.name not in _own(family)}
+    """Parts of other packages."""
+    return _entry_points(family)[0]
+
+
+@functools.cache
+def _entry_points(family: str) -> tuple[dict[str, EntryPoint], list[EntryPoint]]:
+    """Those of other packages by their names; and those whose name is ours, or a package's before them."""
+    found: dict[str, EntryPoint] = {}
+    hidden = []
+    for entry in sorted(entry_points(group=f"evplace.{family}"), key=_distribution):
+        if entry.name in _own(family) or entry.name in found:
+            hidden.append(entry)
+        else:
+            found[entry.name] = entry
+    return found, hidden
+
+
+def _origin(part: object) -> tuple[str, str]:
+    """The module that a part comes from, and the name of its class or function there; "" for a module."""
+    if inspect.ismodule(part):
+        return part.__name__, ""
+    named: Any = part if inspect.isclass(part) or inspect.isroutine(part) else type(part)
+    return str(named.__module__), str(named.__qualname__)
 
 
 def _class_of(module: Any, name: str) -> Any:
@@ -204,3 +250,10 @@ def _entry(family: str, name: str) -> Entry:
     summary = (inspect.getdoc(about) or "").split("\n\n")[0].replace("\n", " ")
     needs = f" Needs {part.NEEDS}." if family == "datasets" else ""
     return Entry(name, package, summary + needs)
+
+
+def _hidden_entry(family: str, entry: EntryPoint) -> Entry:
+    package, other = _distribution(entry), _others(family).get(entry.name)
+    first = "evplace's own" if other is None else f"that of the package {_distribution(other)}"
+    fault = f"hidden by {first}: the package {package} must give its {family.removesuffix('s')} another name"
+    return Entry(f"{entry.name} ({package})", package, "", fault)

@@ -10,6 +10,7 @@ import contextlib
 import errno
 import hashlib
 import json
+import math
 import os
 import shutil
 import sys
@@ -123,13 +124,20 @@ def write_json(path: Path, value: object) -> None:
     path.write_text(json.dumps(value, indent=1, allow_nan=False) + "\n", "utf-8")
 
 
+def read_bytes(path: Path, what: str) -> bytes:
+    """The bytes of a file; InputError, naming `what` it should be, where there is none, or a device."""
+    try:
+        _refuse_device(path, what)
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read {what}: {path}: {error.strerror}") from error
+
+
 def read_json(path: Path, what: str) -> dict[str, Any]:
     """The JSON object in `path`; InputError, naming `what` it should be, where there is none."""
     try:
-        value = json.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read {what}: {path}: {error.strerror}") from error
-    except ValueError as error:
+        value = json.loads(read_bytes(path, what), parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{what} is damaged: {path} is not JSON ({error})") from error
     if not isinstance(value, dict):
         raise InputError(f"{what} is damaged: {path} holds no JSON object")
@@ -183,11 +191,13 @@ def read_array(path: str | Path, what: str, memory_mapped: bool = False) -> NDAr
     length, where reading would allocate it. Nothing is unpickled.
     """
     try:
-        array: NDArray[Any] = np.lib.format.open_memmap(path, mode="r")
+        _refuse_device(Path(path), what)
+        with np.errstate(over="raise"):  # a shape whose size no number holds
+            array: NDArray[Any] = np.lib.format.open_memmap(path, mode="r")
         return array if memory_mapped else np.array(array)
     except OSError as error:
         raise InputError(f"cannot read {what}: {path}: {error.strerror or error}") from error
-    except (ValueError, EOFError, OverflowError) as error:
+    except (ValueError, TypeError, EOFError, ArithmeticError) as error:
         raise InputError(f"{what} is damaged: {path} is not a whole .npy array ({error})") from error
 
 
@@ -195,6 +205,20 @@ def sha256(path: Path) -> str:
     """The checksum of a file's bytes, as hexadecimal text."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _finite(text: str) -> float:
+    """A number of JSON; ValueError for NaN, infinity, and what is too large for any but that."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is no finite number")
+    return value
+
+
+def _refuse_device(path: Path, what: str) -> None:
+    """InputError for a pipe or a device, which would be read for ever."""
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        raise InputError(f"cannot read {what}: {path} is no file")
 
 
 def _refuse_existing(target: Path, overwrite: bool) -> None:

@@ -73,12 +73,15 @@ def _film(film: Film, windows: WindowSettings, track: Track | None) -> Examinati
 
 
 def _examined(subject: Subject, film: Film | None = None) -> Examination:
-    parts = [families.load("doctor", name) for name in families.names("doctor")]
-    checks: list[Check] = [part.Check(subject) for part in parts if subject.kind in part.OF]
+    checks: list[Check] = []
+    for _, module in families.loadable("doctor"):
+        with families.blaming("doctor", module):
+            checks += [module.Check(subject)] if subject.kind in module.OF else []
     for part in _events(subject) if film is None else _frames(subject, film):
         for check in checks:
-            check.see(part)
-    outcomes = [check.outcome() for check in checks]
+            with families.blaming("doctor", check):
+                check.see(part)
+    outcomes = [_outcome(check) for check in checks]
     findings: list[Finding] = [finding for outcome in outcomes for finding in outcome.findings]
     return Examination(
         str(subject.path),
@@ -87,6 +90,11 @@ def _examined(subject: Subject, film: Film | None = None) -> Examination:
         tuple(drawing for outcome in outcomes for drawing in outcome.drawings),
         subject.fault or (subject.track.fault if subject.track is not None else None),
     )
+
+
+def _outcome(check: Check) -> Outcome:
+    with families.blaming("doctor", check):
+        return check.outcome()
 
 
 def _events(subject: Subject) -> Iterator[Events]:

@@ -153,6 +153,9 @@ def _same_zone(place_map: PlaceMap, track: Track | None) -> Track | None:
 def _check_overlap(place_map: PlaceMap, track: Track) -> None:
     """A query a long way from the whole map is a mistake, not a query of unseen places."""
     known = place_map.drive[:, :2]
+    known = known[np.isfinite(known).all(axis=1)]
+    if not len(known):
+        raise EvaluationError("no position of the map's drive is known: train it again with its track")
     low, high = np.nanmin(known, axis=0) - MARGIN_M, np.nanmax(known, axis=0) + MARGIN_M
     if not ((track.xy >= low) & (track.xy <= high)).all(axis=1).any():
         raise EvaluationError(
@@ -162,5 +165,8 @@ def _check_overlap(place_map: PlaceMap, track: Track) -> None:
 
 
 def _span(xy: NDArray[np.float64]) -> str:
+    xy = xy[np.isfinite(xy).all(axis=1)]
+    if not len(xy):
+        return "nothing that is known"
     (west, south), (east, north) = np.nanmin(xy, axis=0), np.nanmax(xy, axis=0)
     return f"{west:.0f} to {east:.0f}, {south:.0f} to {north:.0f}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -113,7 +114,7 @@ class Result:
             summary = storage.read_json(folder / "result.json", what)
             curve = storage.read_array(folder / MARK, what).reshape(-1, len(CURVE))
             _check_summary(summary)
-            answers, columns = _read_matches(folder / "matches.csv")
+            answers, columns = _read_matches(storage.read_bytes(folder / "matches.csv", what).decode())
             images = _kept(folder / "samples.npy")
             samples = Samples.of(summary["samples"], images) if images is not None else None
             result = cls(
@@ -125,7 +126,7 @@ class Result:
             _check_fit(result)
         except InputError as error:
             raise EvaluationError(str(error)) from error
-        except (OSError, EOFError, KeyError, TypeError, ValueError) as error:
+        except (OSError, EOFError, KeyError, TypeError, ValueError, ArithmeticError, csv.Error) as error:
             raise EvaluationError(f"the result in {folder} is damaged ({error}): evaluate again") from error
         return result
 
@@ -177,9 +178,14 @@ def _check_fit(result: Result) -> None:
     queries, items = len(result.judged), result.figures["items"]
     if len(result.answers.item) and result.answers.item.max() >= items:
         raise ValueError(f"item {result.answers.item.max()} of {items}")
-    for array, shape in ((result.query_xy, (queries, 2)), (result.item_xy, (items, 2))):
-        if array is not None and array.shape != shape:
-            raise ValueError(f"positions of shape {array.shape} in place of {shape}")
+    for name, array, shape in (
+        ("query_xy", result.query_xy, (queries, 2)),
+        ("item_xy", result.item_xy, (items, 2)),
+        ("scores", result.scores, (queries, items)),
+        ("pr_curve", result.curve, result.curve.shape),
+    ):
+        if array is not None and (array.shape != shape or array.dtype not in (np.float64, np.float32)):
+            raise ValueError(f"its {name} are {array.dtype} {array.shape} in place of floats {shape}")
     if result.samples is not None and np.any(result.samples.query >= queries):
         raise ValueError(f"samples of queries beyond the {queries}")
 
@@ -198,9 +204,8 @@ def _write_matches(path: Path, result: Result) -> None:
         )  # fmt: skip
 
 
-def _read_matches(path: Path) -> tuple[Answers, dict[str, NDArray[Any]]]:
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+def _read_matches(text: str) -> tuple[Answers, dict[str, NDArray[Any]]]:
+    rows = list(csv.DictReader(io.StringIO(text, newline="")))
     column = {name: [row[name] for row in rows] for name in _MATCHES[:-1]}
     flags = {name: np.array(column[name], np.int64).astype(np.bool_) for name in ("judged", "seen", "right")}
     answers = Answers(

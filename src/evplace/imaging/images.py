@@ -28,7 +28,7 @@ class ImageSettings:
     """How a window of events becomes an image."""
 
     representation: str = "binary"
-    """binary (paper, Eq. 3), polarity, count, time-surface or voxel."""
+    """binary (paper, Eq. 3), polarity, count, time-surface, voxel ...: `evplace list representations`."""
     width: int = 160
     """Columns of the image (paper: 160)."""
     height: int = 90

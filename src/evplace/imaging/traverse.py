@@ -48,13 +48,14 @@ class Traverse:
     """(H, W) True at the sensor's pixels whose events were left out; None where all were taken."""
 
     def __post_init__(self) -> None:
-        if not len(self.images):
+        if not self.images.size:
             raise TraverseError("a traverse without images: there is nothing to learn or to localise")
+        self._check_arrays()
         lengths = {len(self.images), len(self.t_us), len(self.counts)}
         lengths |= {len(self.track.t_us)} if self.track is not None else set()
         if len(lengths) > 1:
             raise TraverseError(f"images, times, counts and track must be equally many, these are {lengths}")
-        self._check()
+        self._check_values()
 
     def __len__(self) -> int:
         return len(self.images)
@@ -97,11 +98,15 @@ class Traverse:
         except InputError as error:
             raise TraverseError(str(error)) from error
 
-    def _check(self) -> None:
-        """TraverseError where a part is not what it is said to be: folders are edited by other programs."""
+    def _check_arrays(self) -> None:
+        """TraverseError where an array is not what it is said to be: folders are edited by other programs."""
         check_array(self.images, "images", np.uint8, (3, 4))
         for name in ("t_us", "counts"):
             check_array(getattr(self, name), name, np.int64, (1,))
+        if self.mask is not None:
+            check_array(self.mask, "mask", np.bool_, (2,))
+
+    def _check_values(self) -> None:
         if np.any(np.diff(self.t_us) < 0):
             at = int(np.argmax(np.diff(self.t_us) < 0)) + 1
             raise TraverseError(f"the times run backwards at image {at}: images must stand in order of time")
@@ -109,8 +114,6 @@ class Traverse:
             raise TraverseError(
                 f"an image of {self.counts.min()} events: counts are 0 or more, -1 for frames"
             )
-        if self.mask is not None:
-            check_array(self.mask, "mask", np.bool_, (2,))
         if not isinstance(self.info, dict):
             raise TraverseError(f"the info of a traverse is a JSON object, not {type(self.info).__name__}")
 
@@ -221,6 +224,7 @@ def _load_track(folder: Path, t_us: NDArray[np.int64], zone: Any, what: str) -> 
     if zone is None:
         return None
     columns = read_array(folder / "track.npy", what)
+    check_array(t_us, "t_us", np.int64, (1,))
     if columns.shape != (len(t_us), 5) or columns.dtype != np.float64 or np.isinf(columns).any():
         raise TraverseError(
             f"{what} is damaged: its track is {columns.dtype} {columns.shape} for {len(t_us)} images"

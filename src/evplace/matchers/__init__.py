@@ -135,5 +135,13 @@ def open_matcher(
     return matcher.start(distances)
 
 
+from evplace.matchers._rows import Answers, RowCheck  # noqa: E402 - they are made of what stands above
+
+__all__ = [
+    "Answer", "Answers", "Judge", "Matcher", "Matching", "Path", "Row", "RowCheck", "Rows", "Sweep",
+    "open_matcher", "stepped",
+]  # fmt: skip
+
+
 def __getattr__(name: str) -> Any:
     return families.class_called("matchers", name)

@@ -104,8 +104,7 @@ class _DescribedRows:
 
     def _vectors(self, images: NDArray[np.uint8]) -> Vectors:
         vectors = self._descriptor.describe(images)
-        shape = getattr(vectors, "shape", None)
-        if shape is None or len(shape) != 2 or shape[0] != len(images) or not np.isfinite(vectors).all():
+        if not (_are_numbers(vectors) and vectors.ndim == 2 and len(vectors) == len(images)):
             raise PartError(
                 f"{families.described('scorers', self._descriptor)} must give finite vectors "
                 f"({len(images)}, dimensions) for {len(images)} images, it gave {_kind_of(vectors)}"
@@ -144,10 +143,15 @@ def references_of(content: Content) -> NDArray[np.uint8]:
     return images
 
 
+def _are_numbers(value: object) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "fiu" and bool(np.isfinite(value).all())
+
+
 def _kind_of(value: object) -> str:
     if not isinstance(value, np.ndarray):
         return type(value).__name__
-    return f"{value.dtype} {value.shape}" + ("" if np.isfinite(value).all() else " with NaN or infinity")
+    unfinite = value.dtype.kind in "fiu" and not _are_numbers(value)
+    return f"{value.dtype} {value.shape}" + (" with NaN or infinity" if unfinite else "")
 
 
 def __getattr__(name: str) -> Any:

@@ -64,7 +64,7 @@ def _blur(n: int, sigma: float) -> NDArray[np.float64]:
     """(n, n): row i holds the weights of the Gaussian around i; cut at 4 sigma."""
     if sigma == 0 or n == 1:
         return np.eye(n)
-    reach = min(int(4 * sigma + 0.5), n - 1)
+    reach = int(min(4 * sigma + 0.5, n - 1))
     shifts = np.arange(-reach, reach + 1)
     kernel = np.exp(-0.5 * (shifts / sigma) ** 2)
     kernel /= kernel.sum()

@@ -96,21 +96,31 @@ class NetworkRows:
         """From an ONNX graph; one thread, which is the fastest for one image at a time."""
         import onnxruntime as ort
 
+        from evplace.scorers._network.network_onnx import INPUT, check_graph
+
+        check_graph(network)
         options = ort.SessionOptions()
         options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
         options.log_severity_level = 3
         try:
-            self._session = ort.InferenceSession(network, options, providers=["CPUExecutionProvider"])
+            # With a fallback, which would be the same processor again, it prints to the standard output.
+            how = {"providers": ["CPUExecutionProvider"], "enable_fallback": 0}
+            self._session = ort.InferenceSession(network, options, **how)
         except Exception as error:  # onnxruntime's errors share no public base
-            raise PlaceMapError(f"the map's network.onnx cannot be run: {error}") from error
+            raise _unfit(error) from error
+        if [one.name for one in self._session.get_inputs()] != [INPUT]:
+            raise PlaceMapError(f"the map's {GRAPH} does not take '{INPUT}' alone")
 
     def rows(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
         """See OpenScorer."""
         layers = images[:, None] if images.ndim == 3 else np.moveaxis(images, -1, 1)
         parts = [layers[start : start + BATCH] for start in range(0, len(layers), BATCH)]
-        scores = [self._session.run(None, {"images": np.ascontiguousarray(part)})[0] for part in parts]
-        return np.concatenate(scores)
+        try:
+            scores = [self._session.run(None, {"images": np.ascontiguousarray(part)})[0] for part in parts]
+            return np.concatenate(scores)
+        except Exception as error:  # likewise; so is a graph that fits neither these images nor itself
+            raise _unfit(error) from error
 
 
 def file_of(content: Content, name: str) -> bytes:
@@ -119,3 +129,8 @@ def file_of(content: Content, name: str) -> bytes:
     if not isinstance(found, bytes):
         raise PlaceMapError(f"the map holds no {name}: train it with the scorer 'network'")
     return found
+
+
+def _unfit(error: Exception) -> PlaceMapError:
+    reason = " ".join(str(error).split())[:300]
+    return PlaceMapError(f"the map's {GRAPH} cannot be run: {reason}")

@@ -17,6 +17,9 @@ from evplace.scorers import Content, Learned, Learning, Rows, keep_images, refer
 from evplace.scorers._distances import sad
 from evplace.scorers._seqslam_images import prepare
 
+LARGEST = 4096
+"""Columns and rows of a reduced image at most."""
+
 
 @dataclass(frozen=True)
 class SeqSLAM:
@@ -30,10 +33,11 @@ class SeqSLAM:
     """Side of the patches whose contrast is normalised (OpenSeqSLAM 2013: 8); 0 leaves them as they are."""
 
     def __post_init__(self) -> None:
-        if self.width < 1 or self.height < 1 or self.patch < 0 or self.patch == 1:
+        fits = 0 < self.width <= LARGEST and 0 < self.height <= LARGEST
+        if not fits or not 0 <= self.patch <= LARGEST or self.patch == 1:
             raise SettingsError(
                 f"images of {self.width}x{self.height} in patches of {self.patch} are impossible: take a "
-                "width and height from 1, and a patch of 0 (none) or from 2"
+                f"width and height from 1 to {LARGEST}, and a patch of 0 (none) or from 2 to {LARGEST}"
             )
 
     def learn(self, reference: Traverse, places: Places, _: Learning) -> Learned:

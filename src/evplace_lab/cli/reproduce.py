@@ -6,6 +6,7 @@ Examples:
   evplace reproduce figure5 --city city -o out          what table2 has trained is not trained again
   evplace reproduce ablations --city city -o out
   evplace reproduce real --data data -o out             real sets that lie in a folder
+  evplace reproduce table2 --city city -o out --methods own.toml    with methods of your own as further rows
   evplace reproduce table2 --city small -o quick --seeds 1 --set steps=50
 
 OUT gets NAME.json and the results; `evplace report OUT` makes a page of them. A call that was stopped goes on
@@ -24,6 +25,7 @@ from evplace.cli._output import print_json, print_table, progress
 from evplace.cli._settings import Pairs, a_part_of
 from evplace.core import families
 from evplace_lab.reproduction import Choice, reproduce
+from evplace_lab.reproduction._recipes import read_methods
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,9 @@ class Args:
     """For table2 and figure5: only these inputs, for example events colour; all if not given."""
     set: Pairs = ()
     """A setting of all trainings over the recipes', as name=value: for a quick look."""
+    methods: Path | None = None
+    """For table2, figure5 and real: a TOML file of further methods, a table each with scorer and matcher, and
+    where they are not the defaults preset, settings, scorer_settings, every. Parts of other packages too."""
     workers: int | None = None
     """Processes; one a core if not given. They do not change the result."""
     json: bool = False
@@ -52,7 +57,8 @@ class Args:
 
 def run(args: Args) -> int:
     """Run what is missing, print the tables."""
-    choice = Choice(args.seeds, dict(args.set), args.inputs)
+    own = {} if args.methods is None else read_methods(args.methods)
+    choice = Choice(args.seeds, dict(args.set), args.inputs, own)
     with progress(args.name) as show:
         document = reproduce(args.name, args.out, args.city, args.data, choice, args.workers, show)
     if args.json:

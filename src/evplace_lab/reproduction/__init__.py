@@ -1,9 +1,10 @@
 """The paper's comparison on the benchmark city and on real sets: from recipes to documents.
 
-One file a table or figure; its name is what users ask for. Each holds NEEDS (city or data), `cases(drives,
-choice)` (all that must be run), `collect(drives, runs, choice)` (the document, as plain values), and
-`tables(document)` (the same for people). What was run is kept by its settings in the output folder, so that a
-second call, another table or a killed call runs only what is missing.
+One file a table or figure; its name is what users ask for. Each holds NEEDS (city or data), INPUTS (those
+that it can be limited to; empty for none), METHODS (those beside which further ones can stand; empty where
+none can), `cases(drives, choice)` (all that must be run), `collect(drives, runs, choice)` (the document, as
+plain values), and `tables(document)` (the same for people). What was run is kept by its settings in the
+output folder, so that a second call, another table or a killed call runs only what is missing.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ from typing import Any, NamedTuple
 
 from evplace.core import families
 from evplace.core.errors import InputError, SettingsError
+from evplace.core.settings import to_dict
 from evplace.core.storage import locked, new_file, write_json
 from evplace.core.workers import run_all
 from evplace.evaluation import versions
 from evplace_lab.city import Progress as CityProgress
 from evplace_lab.city import generate
-from evplace_lab.reproduction._cases import Case
+from evplace_lab.reproduction._cases import Case, Method
 from evplace_lab.reproduction._cities import Cities
 from evplace_lab.reproduction._real_sets import RealSets
 from evplace_lab.reproduction._runs import Runs
@@ -43,6 +45,8 @@ class Choice:
     """Settings of all trainings over those of the recipes: for a quick look."""
     inputs: tuple[str, ...] = ()
     """Only these inputs; empty for all."""
+    methods: dict[str, Method] = field(default_factory=dict)
+    """Further methods beside those of the recipes, by names of their own: see `read_methods`."""
 
     def __post_init__(self) -> None:
         if self.seeds < 1:
@@ -93,7 +97,8 @@ def reproduce(
         _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, count, progress)
         document: dict[str, Any] = family.collect(drives, runs, chosen)
         document |= {
-            "settings": {"drives": drives.settings, "seeds": chosen.seeds, "train": chosen.train},
+            "settings": {"drives": drives.settings, "seeds": chosen.seeds, "train": chosen.train}
+            | ({"methods": to_dict(chosen)["methods"]} if chosen.methods else {}),
             "versions": versions(),
             "took_s": round(time.monotonic() - began, 1),
             "cpu_s": round(runs.cpu_s(cases), 1),
@@ -107,6 +112,11 @@ def _check(name: str, family: ModuleType, choice: Choice, workers: int) -> None:
     """SettingsError for a choice that this table cannot make."""
     if workers < 1:
         raise SettingsError(f"{workers} processes can do nothing: take at least 1")
+    if choice.methods and not family.METHODS:
+        raise SettingsError(f"{name} changes the paper's own methods: no others can stand in it")
+    for one in choice.methods:
+        if one in family.METHODS:
+            raise SettingsError(f"the method '{one}' is the recipes' own: give yours another name")
     for one in choice.inputs:
         if one not in family.INPUTS:
             known = ", ".join(family.INPUTS) or "none: it is made of all that it needs"

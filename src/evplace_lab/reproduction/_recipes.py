@@ -24,14 +24,14 @@ def inputs() -> dict[str, Input]:
 @cache
 def methods() -> dict[str, Method]:
     """Name -> method of the city's tables, in the order of the file."""
-    return _methods("methods.toml")
+    return read_methods(FOLDER / "methods.toml")
 
 
 @cache
 def real_methods() -> dict[str, Method]:
     """Name -> method on real sets: the tables' own on every image, and some besides."""
     own = {name: dataclasses.replace(method, every=1) for name, method in methods().items()}
-    return own | _methods("real/methods.toml")
+    return own | read_methods(FOLDER / "real" / "methods.toml")
 
 
 def recipes(family: str, kind: type[R]) -> list[R]:
@@ -49,8 +49,19 @@ def _recipe(file: Path, kind: type[R]) -> R:
         raise SettingsError(f"the recipe {file.name}: {error}") from error
 
 
-def _methods(name: str) -> dict[str, Method]:
-    return {name: settings.make(Method, values) for name, values in _toml(name).items()}
+def read_methods(path: Path) -> dict[str, Method]:
+    """Name -> method, in the order of a TOML file with a table for each; SettingsError where one is none."""
+    found = {}
+    for name, values in settings.from_toml(path).items():
+        if not isinstance(values, dict):
+            raise SettingsError(
+                f"{path}: '{name}' is no method, which is a table with a scorer and a matcher"
+            )
+        try:
+            found[name] = settings.make(Method, values)
+        except (SettingsError, TypeError) as error:
+            raise SettingsError(f"the method '{name}' in {path}: {error}") from error
+    return found
 
 
 def _toml(name: str) -> dict[str, dict[str, Any]]:

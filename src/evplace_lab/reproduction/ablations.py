@@ -23,6 +23,7 @@ from evplace_lab.reproduction._runs import Runs
 TITLE = "Ablations: one change at a time against the paper's training and matching"
 NEEDS = "city"
 INPUTS: tuple[str, ...] = ()
+METHODS: tuple[str, ...] = ()
 FORMAT = "evplace-ablations-1"
 DATABASE, INPUT = "day-1", "events"
 NO_EFFECT = "no effect seen"

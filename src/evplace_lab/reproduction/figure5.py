@@ -25,6 +25,7 @@ from evplace_lab.reproduction._runs import TIMINGS, Runs
 TITLE = "Figure 5: precision against recall of live answers, and of hindsight where it is said"
 NEEDS = "city"
 INPUTS = ("events", "events, from 8 bit", "colour")
+METHODS = tuple(methods())
 FORMAT = "evplace-curves-1"
 
 
@@ -106,10 +107,9 @@ def _curves(choice: Choice) -> Iterator[tuple[Recipe, str, str, list[Case]]]:
         for name in recipe.inputs:
             if choice.inputs and name not in choice.inputs:
                 continue
-            for method in recipe.methods:
-                first = Case.of(
-                    recipe.database, recipe.query, inputs()[name], methods()[method], choice.train
-                )
+            for method in (*recipe.methods, *choice.methods):
+                how = (methods() | choice.methods)[method]
+                first = Case.of(recipe.database, recipe.query, inputs()[name], how, choice.train)
                 yield (
                     recipe,
                     name,

@@ -19,6 +19,7 @@ from evplace_lab.reproduction._runs import Runs
 TITLE = "Real drives: accuracy in % of live answers, and of hindsight where it is said"
 NEEDS = "data"
 INPUTS: tuple[str, ...] = ()
+METHODS = tuple(real_methods())
 FORMAT = "evplace-table-1"
 
 
@@ -62,6 +63,7 @@ def _cells(drives: Drives, choice: Choice) -> Iterator[tuple[RealSet, str, list[
     seen = Input(sensor="real", part="images")
     for real in drives.present:
         database, query = (f"{real.title}: {drive}" for drive in (real.reference, real.query))
-        for method in real.methods:
-            case = Case.of(database, query, seen, real_methods()[method], choice.train)
+        for method in (*real.methods, *choice.methods):
+            how = (real_methods() | choice.methods)[method]
+            case = Case.of(database, query, seen, how, choice.train)
             yield real, method, case.with_seeds(choice.seeds)

@@ -19,6 +19,7 @@ from evplace_lab.reproduction._runs import Runs
 TITLE = "Table 2: accuracy in % of live answers, and of hindsight where it is said; map: day, path 1"
 NEEDS = "city"
 INPUTS = tuple(inputs())
+METHODS = tuple(methods())
 FORMAT = "evplace-table-1"
 KEPT_INPUTS = ("events", "events, from 8 bit", "colour")
 KEPT_METHODS = (
@@ -82,12 +83,12 @@ def _cells(choice: Choice) -> Iterator[tuple[Recipe, str, str, list[Case]]]:
     """Each row, input and method with its cases: one a seed, or one where nothing is trained."""
     for recipe in recipes("table2", Recipe):
         for name in choice.inputs or inputs():
-            for method, how in methods().items():
+            for method, how in (methods() | choice.methods).items():
                 first = Case.of(recipe.database, recipe.query, inputs()[name], how, choice.train)
                 if inputs()[name].train and first.train is None:
                     continue  # another training is no other input to what is not trained
                 group = first.with_seeds(choice.seeds)
-                if name in KEPT_INPUTS and method in KEPT_METHODS:
+                if name in KEPT_INPUTS and method in (*KEPT_METHODS, *choice.methods):
                     group[0] = replace(group[0], keep=f"{recipe.query}, {name}, {method}")
                 yield recipe, name, method, group
 

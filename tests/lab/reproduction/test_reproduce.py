@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from evplace_lab.reproduction import Choice, ablations, figure5, real, reproduce
 from evplace_lab.reproduction._cases import Case
 from evplace_lab.reproduction._cities import Cities
 from evplace_lab.reproduction._real_sets import RealSet
-from evplace_lab.reproduction._recipes import inputs, methods, recipes
+from evplace_lab.reproduction._recipes import inputs, methods, read_methods, recipes
 
 pytest.importorskip("torch", reason="the network needs the extra 'train'")
 
@@ -117,6 +118,40 @@ def test_nothing_is_run_twice_and_other_settings_are(
     settings = Cities(city, out).settings
     assert case.key(settings) != longer.key(settings)
     assert case.key(settings) != case.key({**settings, "seed": 1})
+
+
+def test_methods_of_ones_own_stand_beside_the_others(
+    table: dict[str, Any], city: Path, out: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(
+        '[mine]\nscorer = "sad"\nmatcher = "best"\n["mine, later"]\nscorer = "sad"\nmatcher = "hmm"\n'
+    )
+    own = read_methods(file)
+    made = reproduce("table2", out, city, choice=replace(SOME, methods=own), workers=1)
+    rows = [row for row in made["rows"] if row["matcher"] not in own]
+    assert rows == table["rows"]
+    mine = [row for row in made["rows"] if row["matcher"] == "mine"]
+    assert {row["input"] for row in mine} == {"events", "colour, both"}
+    assert made["settings"]["methods"]["mine"]["scorer"] == "sad"
+    assert (out / "results" / "night-1, events, mine" / "result.json").exists()
+    figure = reproduce("figure5", out, city, choice=Choice(1, TRAINING, ("events",), own), workers=1)
+    assert {curve["panel"] for curve in figure["curves"] if curve["matcher"] == "mine"} == {
+        "day-night",
+        "day-rain",
+    }
+    with pytest.raises(SettingsError, match="the method 'global-max' is the recipes' own"):
+        reproduce("table2", out, city, choice=Choice(methods={"global-max": own["mine"]}))
+    with pytest.raises(SettingsError, match="no others can stand in it"):
+        reproduce("ablations", out, city, choice=Choice(methods=own))
+    for text, words in (
+        ("a = 3", "'a' is no method"),
+        ("[a]\nscorer = 'sad'", "the method 'a' in .*matcher"),
+        ("[a]\nscorers = 'sad'", "the method 'a' in .*did you mean 'scorer'"),
+    ):
+        file.write_text(text)
+        with pytest.raises(SettingsError, match=words):
+            read_methods(file)
 
 
 def test_figure_5_has_a_curve_for_each_method(table: dict[str, Any], city: Path, out: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from evplace.core.errors import SettingsError, TraverseError
+from evplace.core.errors import PlaceMapError, SettingsError, TraverseError
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap, train
@@ -20,7 +20,7 @@ from evplace.scorers._network.training import batches, train_network
 torch = pytest.importorskip("torch", reason="the network needs the extra 'train'")
 
 from evplace.scorers._network.network import Network, NetworkSettings, to_input, weights_of  # noqa: E402 - only with torch
-from evplace.scorers._network.network_onnx import onnx_bytes  # noqa: E402
+from evplace.scorers._network.network_onnx import OPERATORS, check_graph, onnx_bytes  # noqa: E402
 from evplace.scorers.network import GRAPH, NetworkRows, TrainSettings  # noqa: E402
 
 Images = NDArray[np.uint8]
@@ -172,3 +172,46 @@ def test_one_place_only_is_learned(day: Traverse) -> None:
     one = PlaceGrid.from_track(day.track, cell_m=1e6)
     learned = train(day, one, steps=1, batch=4)
     assert Localizer(learned).rows(day.images[:2]).tolist() == [[1.0], [1.0]]
+
+
+def test_a_graph_of_other_operators_is_refused(network_map: PlaceMap) -> None:
+    """A loop could run for ever, and weights in other files would be read from anywhere."""
+    onnx = pytest.importorskip("onnx")
+    network = network_map.content["network.onnx"]
+    assert isinstance(network, bytes)
+    check_graph(network)
+    model = onnx.load_from_string(network)
+    assert {node.op_type for node in model.graph.node} == OPERATORS
+    for change, words in (
+        (lambda one: setattr(one.graph.node[3], "op_type", "Loop"), "it holds 'Loop'"),
+        (lambda one: setattr(one.graph.node[3], "domain", "someone"), "it holds 'someone'"),
+        (lambda one: one.functions.add(), "it holds 'functions of its own'"),
+        (
+            lambda one: one.graph.initializer[0].external_data.add(key="location", value="x"),
+            "weights lie in other files",
+        ),
+        (lambda one: setattr(one.graph.initializer[0], "data_location", 1), "weights lie in other files"),
+    ):
+        changed = onnx.load_from_string(network)
+        change(changed)
+        with pytest.raises(PlaceMapError, match=words):
+            NetworkRows(changed.SerializeToString())
+
+
+def test_a_damaged_graph_is_one_line(
+    network_map: PlaceMap, night: Traverse, capsys: pytest.CaptureFixture[str]
+) -> None:
+    network = network_map.content["network.onnx"]
+    assert isinstance(network, bytes)
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        damaged = bytearray(network)
+        damaged[rng.integers(0, min(len(damaged), 4000))] ^= 1 << int(rng.integers(0, 8))
+        try:
+            NetworkRows(bytes(damaged)).rows(night.images[:1])
+        except PlaceMapError as error:
+            assert "\n" not in str(error)  # noqa: PT017 - some bits make no difference
+    for size in (0, 1, 5, 100, len(network) - 1):
+        with pytest.raises(PlaceMapError):
+            NetworkRows(network[:size])
+    assert not capsys.readouterr().out

@@ -10,50 +10,19 @@ from __future__ import annotations
 
 import contextlib
 import importlib
-import random
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
-
 from evplace.core.errors import EvplaceError
-from evplace.core.events import Events
 from evplace.sources.readers import _decoder
 from evplace.sources.readers._recording import Recording
 from evplace.sources.readers._source import Hints
-
-STRUCTURE = 2000
-"""Bytes at the start in which half of the flips lie."""
-
-
-def cuts(length: int, seed: int, count: int) -> list[int]:
-    """Places to cut a file of `length` bytes."""
-    rng = random.Random(seed)
-    return [rng.randrange(length) for _ in range(count)]
-
-
-def flipped(data: bytes, seed: int, number: int) -> bytes:
-    """`data` with one bit flipped."""
-    rng = random.Random(f"{seed} {number}")
-    at = rng.randrange(len(data) if number % 2 else min(len(data), STRUCTURE))
-    return data[:at] + bytes([data[at] ^ 1 << rng.randrange(8)]) + data[at + 1 :]
+from evplace.testing._readers import check_packets, cut_at, flipped
 
 
 def damaged(data: bytes, kind: str, seed: int, number: int, count: int) -> bytes:
     """Cut or flip of that number, of `count`."""
-    return flipped(data, seed, number) if kind == "flip" else data[: cuts(len(data), seed, count)[number]]
-
-
-def check(packets: Iterable[Events], size: tuple[int, int]) -> None:
-    """Times never decrease and pixels lie on the sensor."""
-    last = -(1 << 63)
-    for packet in packets:
-        assert np.all(np.diff(packet.t_us) >= 0)
-        assert packet.t_us[0] >= last
-        assert packet.x.max() < size[0]
-        assert packet.y.max() < size[1]
-        last = int(packet.t_us[-1])
+    return flipped(data, seed, number) if kind == "flip" else data[: cut_at(len(data), seed, count)[number]]
 
 
 def main(reader: str, file: str, kind: str, seed: int, first: int, count: int) -> None:
@@ -68,7 +37,7 @@ def main(reader: str, file: str, kind: str, seed: int, first: int, count: int) -
         with contextlib.suppress(EvplaceError):
             for packet in Recording(bad, reader, module.open_here(bad, Hints(size)), size).packets():
                 packets.append(packet)
-        check(packets, size)
+        check_packets(packets, size, reader)
 
 
 if __name__ == "__main__":

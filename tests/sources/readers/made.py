@@ -16,17 +16,9 @@ import pytest
 from evplace.core.errors import DamagedRecordingError
 from evplace.core.events import Events
 from evplace.sources.readers import Recording
+from evplace.testing._readers import SIZE, some_events
 
-SIZE = (240, 180)
-
-
-def some_events(count: int = 3000, span_us: int = 100_000, seed: int = 0) -> Events:
-    """Random events of a 240x180 sensor, in order."""
-    rng = np.random.default_rng(seed)
-    t_us = np.sort(rng.integers(0, span_us, count))
-    return Events.of(
-        t_us, rng.integers(0, 240, count), rng.integers(0, 180, count), rng.random(count) < 0.5, SIZE
-    )
+__all__ = ["MAKERS", "SIZE", "some_events"]
 
 
 def good_part(recording: Recording) -> Events:

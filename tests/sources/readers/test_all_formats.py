@@ -6,7 +6,6 @@ import contextlib
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import damage
@@ -19,6 +18,8 @@ from evplace.core import families
 from evplace.core.errors import DamagedRecordingError, EvplaceError, RecordingError
 from evplace.core.events import Events
 from evplace.sources.readers import open_recording
+from evplace.testing import check_reader
+from evplace.testing._readers import check_packets
 
 CUTS = int(os.environ.get("EVPLACE_CUTS", "200"))
 FLIPS = int(os.environ.get("EVPLACE_FLIPS", "2000"))
@@ -28,7 +29,6 @@ UNREADABLE_WHEN_CUT = ("npz", "hdf5", "parquet")
 ISOLATED = {"hdf5": "_hdf5", "parquet": "_parquet"}
 """Formats that start a process for each reading -> what runs in it: here many readings share one."""
 formats = pytest.mark.parametrize("form", sorted(MAKERS))
-in_this_process = pytest.mark.parametrize("form", sorted(set(MAKERS) - set(ISOLATED)))
 
 
 def test_each_format_has_a_maker() -> None:
@@ -46,55 +46,12 @@ def read_all(path: Path) -> tuple[list[Events], EvplaceError | None]:
     return packets, None
 
 
-def sorted_rows(events: Events) -> np.ndarray:
-    """Formats may change the order of events of one time."""
-    order = np.lexsort((events.p, events.x, events.y, events.t_us))
-    return np.stack([events.t_us[order], events.x[order], events.y[order], events.p[order]])
-
-
 @formats
-def test_events_come_back(form: str, tmp_path: Path) -> None:
-    events = some_events()
-    recording = open_recording(MAKERS[form](tmp_path, events))
-    back = Events.concatenate(list(recording.packets()))
-    shift = back.t_us[0] - events.t_us[0] if form.startswith("ros") else 0
-    assert (recording.format, recording.size, back.size) == (form, SIZE, SIZE)
-    assert all("\n" not in note for note in recording.notes)
-    moved = Events(events.t_us + shift, events.x, events.y, events.p, SIZE)
-    assert np.array_equal(sorted_rows(back), sorted_rows(moved))
-    assert (back.t_us.dtype, back.x.dtype, back.p.dtype) == (np.int64, np.uint16, np.bool_)
-    assert (recording.events, sum(recording.dropped.values())) == (len(events), 0)
-    assert sum(len(packet) for packet in recording.packets()) == len(events), "a second reading starts anew"
-
-
-@in_this_process
-def test_a_cut_anywhere_delivers_what_came_before(form: str, tmp_path: Path) -> None:
-    path = MAKERS[form](tmp_path, some_events())
-    whole, data = Events.concatenate(read_all(path)[0]), path.read_bytes()
-    cut_file, most = tmp_path / f"cut{path.suffix}", 0
-    for at in [*damage.cuts(len(data), SEED, CUTS), len(data) * 9 // 10]:
-        cut_file.write_bytes(data[:at])
-        packets, error = read_all(cut_file)
-        count = sum(map(len, packets))
-        most = max(most, count)
-        if packets:
-            assert np.array_equal(Events.concatenate(packets).t_us, whole.t_us[:count])
-        assert error is None or isinstance(error, RecordingError)
-        assert "\n" not in str(error)
-    assert most > len(whole) // 2 or form in UNREADABLE_WHEN_CUT
-
-
-@in_this_process
-def test_flipped_bytes_give_events_in_order_or_our_error(form: str, tmp_path: Path) -> None:
-    path = MAKERS[form](tmp_path, some_events(500))
-    data, _ = path.read_bytes(), read_all(path)  # compiled before the work is measured
-    flipped_file = tmp_path / f"flipped{path.suffix}"
-    for number in range(FLIPS):
-        flipped_file.write_bytes(damage.flipped(data, SEED, number))
-        start_s = time.process_time()
-        packets, _ = read_all(flipped_file)
-        assert time.process_time() - start_s < 10  # of work, which a busy machine does not make more
-        damage.check(packets, SIZE)
+def test_each_reader_meets_the_contract(form: str) -> None:
+    """Of the formats that start a process for each reading, a few cuts and flips: see below for more."""
+    cuts, flips = (3, 3) if form in ISOLATED else (CUTS, FLIPS)
+    reader = families.load("readers", form)
+    check_reader(reader, MAKERS[form], cuts, flips, SEED, whole=form in UNREADABLE_WHEN_CUT)
 
 
 @pytest.mark.parametrize("kind", ["cut", "flip"])
@@ -118,7 +75,7 @@ def test_damage_that_the_decoder_may_not_survive(form: str, kind: str, tmp_path:
             bad.write_bytes(damage.damaged(data, kind, SEED, first - 1, count))
             packets, error = read_all(bad)
             assert isinstance(error, RecordingError)
-            damage.check(packets, SIZE)
+            check_packets(packets, SIZE, form)
 
 
 def test_a_cut_inside_a_word_is_said(tmp_path: Path) -> None:

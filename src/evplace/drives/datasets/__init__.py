@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from evplace.core import families
-from evplace.core.errors import DatasetError
+from evplace.core.errors import DatasetError, EvplaceError, PartError
 from evplace.imaging.recipe import Recipe
 from evplace.sources.film import Film
 from evplace.sources.readers import Recording
@@ -55,8 +55,7 @@ def open_drive(folder: str | Path, drive: str | None = None, dataset: str | None
     place = Path(folder)
     name = _name_of(place, dataset)
     part = families.load("datasets", name)
-    with families.blaming("datasets", part):
-        known: list[str] = part.drives(place)
+    known = _drives(part, place)
     if not known:
         raise DatasetError(f"{place} holds no drive of {name}, which needs: {part.NEEDS}")
     if drive is None and len(known) > 1:
@@ -64,25 +63,39 @@ def open_drive(folder: str | Path, drive: str | None = None, dataset: str | None
     if drive is not None and drive not in known:
         raise DatasetError(f"{place} holds no drive '{drive}': it holds {', '.join(known)}")
     with families.blaming("datasets", part):
-        opened: Drive = part.open_drive(place, drive or known[0])
+        opened = part.open_drive(place, drive or known[0])
+    if not isinstance(opened, Drive):
+        raise PartError(
+            f"{families.described('datasets', part)} must open a Drive, it gave {type(opened).__name__}"
+        )
+    if isinstance(opened.source, Recording):
+        opened.source.hold("datasets", part)
     return opened
 
 
 def drives(folder: str | Path, dataset: str | None = None) -> list[str]:
     """The names of the drives in a data set's folder; errors as `open_drive`."""
     place = Path(folder)
-    found: list[str] = families.load("datasets", _name_of(place, dataset)).drives(place)
-    return found
+    return _drives(families.load("datasets", _name_of(place, dataset)), place)
 
 
 def matching(folder: Path) -> list[str]:
     """The data sets whose layout the folder has."""
-    return [name for name, part in families.loadable("datasets") if _recognises(part, folder)]
+    return _matching(folder, [])
 
 
-def _recognises(part: Any, folder: Path) -> bool:
+def _matching(folder: Path, faults: list[EvplaceError]) -> list[str]:
+    return sorted(families.recognising("datasets", lambda part: bool(part.recognises(folder)), faults))
+
+
+def _drives(part: Any, folder: Path) -> list[str]:
     with families.blaming("datasets", part):
-        return bool(part.recognises(folder))
+        found: list[str] = part.drives(folder)
+    if not isinstance(found, list) or not all(isinstance(name, str) for name in found):
+        raise PartError(
+            f"{families.described('datasets', part)} must list its drives' names, it gave {found!r}"
+        )
+    return found
 
 
 def _name_of(folder: Path, dataset: str | None) -> str:
@@ -90,12 +103,13 @@ def _name_of(folder: Path, dataset: str | None) -> str:
         raise DatasetError(f"there is no folder {folder}: give the folder of a data set")
     if dataset is not None:
         return dataset
-    found = matching(folder)
+    faults: list[EvplaceError] = []
+    found = _matching(folder, faults)
     if not found:
         known = ", ".join(families.names("datasets"))
         raise DatasetError(
             f"{folder} has the layout of no known data set: known are {known}; "
-            "`evplace list datasets` says what each needs"
+            f"`evplace list datasets` says what each needs{families.besides(faults)}"
         )
     if len(found) > 1:
         raise DatasetError(f"{folder} may be {' or '.join(found)}: say which with `dataset`")

@@ -5,15 +5,21 @@ So few nodes need no tracing: this takes milliseconds where torch's exporter tak
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import MissingExtraError
+from evplace.core.errors import MissingExtraError, PlaceMapError
 
 OPSET = 17
 INPUT, OUTPUT = "images", "scores"
+OPERATORS = frozenset(
+    ("BatchNormalization", "Cast", "Conv", "Div", "Flatten", "Gemm", "MaxPool", "Relu", "Softmax")
+)
+"""What the graph is made of: a map is an input, and others could run for ever or read files."""
 
 
 def onnx_bytes(
@@ -57,6 +63,90 @@ def onnx_bytes(
     checker.check_model(model)
     content: bytes = model.SerializeToString()
     return content
+
+
+def check_graph(network: bytes) -> None:
+    """PlaceMapError where an ONNX graph is damaged, or holds anything but what `onnx_bytes` writes.
+
+    Read without the package onnx, which answering does not need. The numbers are those of onnx.proto.
+    """
+    try:
+        model = _Message(network)
+        graphs = model.parts(7)  # a parser merges those of one message
+        nodes = [node for graph in graphs for node in graph.parts(1)]
+        tensors = [tensor for graph in graphs for tensor in graph.parts(5)]
+        kinds = {kind.text for node in nodes for kind in node.parts(4)}
+        foreign = {kind.text for node in nodes for kind in node.parts(7)} - {""}
+        others = sorted(kinds - OPERATORS) or sorted(foreign) or ["functions of its own"] * model.has(25)
+        elsewhere = any(graph.has(15) for graph in graphs) or any(
+            one.has(13) or one.has(14) for one in tensors
+        )
+    except IndexError as error:
+        raise PlaceMapError("the map's network is damaged: it is no ONNX graph") from error
+    if others:
+        raise PlaceMapError(
+            f"the map's network is none that evplace writes: it holds {', '.join(others)[:99]!r}"
+        )
+    if elsewhere:
+        raise PlaceMapError("the map's network is none that evplace writes: its weights lie in other files")
+
+
+class _Message:
+    """A protobuf message, as far as its fields are asked for; IndexError where it is cut off."""
+
+    def __init__(self, data: object) -> None:
+        if not isinstance(data, bytes | memoryview):
+            raise IndexError("a number in place of a message")
+        self._data = memoryview(data)
+
+    @functools.cached_property
+    def _fields(self) -> list[tuple[int, object]]:
+        return list(_fields(self._data))
+
+    @property
+    def text(self) -> str:
+        """What it says, where it is a text."""
+        return bytes(self._data).decode("ascii", "replace")
+
+    def parts(self, number: int) -> list[_Message]:
+        """The messages, or texts, of that number."""
+        return [_Message(value) for found, value in self._fields if found == number]
+
+    def has(self, number: int) -> bool:
+        """Whether there is a field of that number."""
+        return any(found == number for found, _ in self._fields)
+
+
+def _fields(message: memoryview) -> Iterator[tuple[int, object]]:
+    """Number and value of each field of a protobuf message; IndexError where it is cut off."""
+    at = 0
+    while at < len(message):
+        key, at = _varint(message, at)
+        kind, size = key & 7, {1: 8, 5: 4}.get(key & 7, 0)
+        value: object = None
+        if kind == 0:
+            value, at = _varint(message, at)
+        elif kind == 2:
+            size, at = _varint(message, at)
+            value = message[at : at + size]
+        elif not size:
+            raise IndexError(f"a field of kind {kind}")
+        at += size
+        if at > len(message):
+            raise IndexError("cut off")
+        yield key >> 3, value
+
+
+def _varint(message: memoryview, at: int) -> tuple[int, int]:
+    """The number that begins at a place, and the place after it."""
+    value = 0
+    for shift in range(0, 70, 7):
+        byte = message[at]
+        at += 1
+        value |= (byte & 127) << shift
+        if byte < 128:
+            return value, at
+    raise IndexError("a number without an end")
 
 
 class _Graph:

@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from evplace.core import families
-from evplace.core.errors import RecordingError, UnsupportedError
+from evplace.core.errors import EvplaceError, RecordingError, UnsupportedError
 from evplace.core.events import Size
 from evplace.sources.readers._foreign import foreign
-from evplace.sources.readers._source import Block, Hints, Source
+from evplace.sources.readers._source import Block, Hints, Source, checked_source
 
 if TYPE_CHECKING:
     from evplace.sources.readers._recording import Recording
@@ -70,12 +70,14 @@ def open_recording(
     if columns is not None and not getattr(reader, "TABLE", False):
         raise RecordingError(f"{file} ({reader.ABOUT}) has no columns to tell apart: leave out `columns`")
     try:
-        source: Source = reader.read(file, hints)
+        with families.blaming("readers", reader, OSError):
+            source: Source = reader.read(file, hints)
     except UnsupportedError as error:
         where = "" if str(file) in str(error) else f"{file}: "
         raise UnsupportedError(f"{where}{error}") from error
     except OSError as error:
         raise RecordingError(f"cannot read {file} as {name}: {error.strerror or error}") from error
+    source = checked_source(source, "readers", reader)
     if stream is not None and not source.streams:
         raise RecordingError(f"{file} ({reader.ABOUT}) has one stream, without a name: leave out `stream`")
     return Recording(file, name, source, size)
@@ -128,13 +130,14 @@ def _head(path: Path) -> bytes:
 
 def _found(path: Path, head: bytes, table: bool = False) -> str:
     """The name of the first reader that knows the content; text where only its columns had to be said."""
-    known = families.names("readers")
-    for name in known:
-        if families.load("readers", name).matches(path, head):
-            return name
+    faults: list[EvplaceError] = []
+    for name in families.recognising("readers", lambda reader: reader.matches(path, head), faults):
+        return name
     if table and not path.is_dir():
         return "text"
     if (what := foreign(path, head)) is not None:
         raise UnsupportedError(f"{path} is {what}")
-    what = "the folder" if path.is_dir() else "the content"
-    raise RecordingError(f"{path}: {what} is of no known recording format: known are {', '.join(known)}")
+    known, what = ", ".join(families.names("readers")), "the folder" if path.is_dir() else "the content"
+    raise RecordingError(
+        f"{path}: {what} is of no known recording format: known are {known}{families.besides(faults)}"
+    )

@@ -16,7 +16,7 @@ from evplace.core.errors import (
 )
 from evplace.core.events import Events, Size
 from evplace.sources.readers._checks import NOTHING_YET, REASONS, checked
-from evplace.sources.readers._source import Block, Source, joined
+from evplace.sources.readers._source import Block, Source, checked_source, joined
 from evplace.sources.readers._verdict import verdict
 
 PACKET = 1_000_000
@@ -96,6 +96,10 @@ class Recording:
         doubt = verdict(self.events or 0, self.dropped, span_us, self.size)
         if doubt is not None:
             raise DoubtfulRecordingError(f"{self.path} (as {self.format}): {doubt}")
+
+    def hold(self, family: str, part: object) -> None:
+        """Name `part`, which made this recording's source, where that breaks what it promises."""
+        self._source = checked_source(self._source, family, part)
 
     @property
     def states_size(self) -> bool:

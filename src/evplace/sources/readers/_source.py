@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import RecordingError
+from evplace.core import families
+from evplace.core.errors import PartError, RecordingError
 from evplace.core.events import Size
 
 
@@ -126,3 +127,38 @@ def joined(blocks: list[Block]) -> Block:
         sum(block.untimed for block in blocks),
         max(block.back_us for block in blocks),
     )
+
+
+def checked_source(source: Source, family: str, part: object) -> Source:
+    """The same, whose blocks raise PartError where `part`, which made it, breaks what it promises."""
+    if not isinstance(source, Source):
+        raise PartError(
+            f"{families.described(family, part)} must open a Source, it gave {type(source).__name__}"
+        )
+
+    def blocks() -> Iterator[Block]:
+        with families.blaming(family, part, OSError):
+            for block in source.blocks():
+                _check_block(block, family, part)
+                yield block
+
+    return replace(source, blocks=blocks)
+
+
+def _check_block(block: object, family: str, part: object) -> None:
+    """PartError where a block is not four arrays of one length and of the types that they must have."""
+    if isinstance(block, Block) and _is_block(block):
+        return
+    found = type(block).__name__
+    if isinstance(block, Block):
+        found = ", ".join(f"{np.asarray(column).dtype} {np.shape(column)}" for column in block[:4])
+    raise PartError(
+        f"{families.described(family, part)} must give blocks of t_us int64, x uint16, y uint16 and p bool "
+        f"of one length, it gave {found}"
+    )
+
+
+def _is_block(block: Block) -> bool:
+    columns = [column for column in block[:4] if isinstance(column, np.ndarray)]
+    types, shapes = [column.dtype for column in columns], {column.shape for column in columns}
+    return types == [np.int64, np.uint16, np.uint16, np.bool_] and shapes == {(len(block.t_us),)}

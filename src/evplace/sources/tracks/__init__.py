@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from evplace.core import families, settings
-from evplace.core.errors import SettingsError, TrackError
+from evplace.core.errors import EvplaceError, SettingsError, TrackError
 from evplace.sources._times import DAY_US, day_of
 from evplace.sources.tracks import bag
 from evplace.sources.tracks._fixes import Fixes
@@ -57,8 +57,10 @@ def open_track(
     name = format_of(path)
     kind, presets = families.settings_of("tracks", name)
     chosen = settings.make(kind, values, settings.preset_of(f"the track format '{name}'", presets, preset))
+    part = families.load("tracks", name)
     try:
-        fixes: Fixes = families.load("tracks", name).read(path, chosen)
+        with families.blaming("tracks", part, OSError):
+            fixes: Fixes = part.read(path, chosen)
         days_us = _day_us(date, fixes.dated)
         track = Track.of(fixes, offset_us + days_us, zone, northern, max_speed_mps, keep)
     except TrackError as error:
@@ -89,8 +91,10 @@ def format_of(path: Path) -> str:
         raise TrackError(f"cannot read the GPS log {path}: {error.strerror}") from error
     if not head.strip():
         raise TrackError(f"{path} is empty: give a GPS log with fixes in it")
-    known = families.names("tracks")
-    for name in known:
-        if families.load("tracks", name).recognises(head):
-            return name
-    raise TrackError(f"{path} is no GPS log that is known here: give one of {', '.join(known)}")
+    faults: list[EvplaceError] = []
+    for name in families.recognising("tracks", lambda part: part.recognises(head), faults):
+        return name
+    known = ", ".join(families.names("tracks"))
+    raise TrackError(
+        f"{path} is no GPS log that is known here: give one of {known}{families.besides(faults)}"
+    )

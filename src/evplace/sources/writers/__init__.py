@@ -32,7 +32,7 @@ def write_recording(
     target = Path(path)
     module = families.load("writers", format or _by_suffix(target))
     counted = _Counted(packets)
-    with new_file(target, overwrite) as partial:
+    with new_file(target, overwrite) as partial, families.blaming("writers", module, OSError):
         module.write(partial, counted, size)
     if counted.fault is not None:
         raise counted.fault
@@ -41,7 +41,9 @@ def write_recording(
 
 def _by_suffix(path: Path) -> str:
     """The writer whose suffix the path has."""
-    suffixes = {families.load("writers", name).SUFFIX: name for name in families.names("writers")}
+    suffixes: dict[str, str] = {}
+    for name, part in families.loadable("writers"):
+        suffixes.setdefault(part.SUFFIX, name)
     if path.suffix.lower() not in suffixes:
         known = ", ".join(f"{suffix} ({name})" for suffix, name in suffixes.items())
         raise OutputError(f"cannot tell the format of {path} from its suffix: known are {known}")

@@ -1,0 +1,1 @@
+"""Parts of evplace in a package of their own."""
