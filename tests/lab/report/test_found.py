@@ -64,7 +64,7 @@ def test_what_is_no_folder_or_holds_nothing(tmp_path: Path) -> None:
         ({"rows": [{"query": "night-1"}]}, "an entry without 'input'"),
         ({"rows": [{"query": 3, "input": "events", "matcher": "m", "mean": 1}]}, "the query 3"),
         ({"rows": [{"query": "q", "input": "e", "matcher": "m", "mean": "1"}]}, "the mean '1'"),
-        ({"rows": [{"query": "q", "input": "e", "matcher": "m", "mean": float("nan")}]}, "the mean nan"),
+        ({"rows": [{"query": "q", "input": "e", "matcher": "m", "mean": float("nan")}]}, "NaN is no"),
         ({"rows": [{"query": "q", "input": "e", "matcher": "m", "mean": True}]}, "the mean True"),
     ],
 )
