@@ -15,10 +15,13 @@ import torch
 from torch.nn.functional import cross_entropy
 
 from evplace.imaging.traverse import Traverse
+from evplace.localizer import Localizer
+from evplace.placemap import train
 from evplace.places import PlaceRuns
-from evplace.scorers import open_scorer
+from evplace.scorers import Learning
 from evplace.scorers._network.network import Network, NetworkSettings
-from evplace.scorers._network.training import TrainSettings, train, train_network
+from evplace.scorers._network.training import train_network
+from evplace.scorers.network import TrainSettings
 from harness import alternate, report
 
 PLACES, BATCH, STEPS = 104, 64, 10
@@ -44,7 +47,7 @@ def main() -> None:
     labels = np.arange(PLACES)
     settings = TrainSettings(steps=STEPS, batch=BATCH)
     functions = {
-        "evplace": partial(train_network, images, labels, labels >= 0, PLACES, settings),
+        "evplace": partial(train_network, images, labels, labels >= 0, PLACES, settings, Learning()),
         "plain eager float32": partial(plain_eager, images, labels),
     }
     timings = alternate(functions)
@@ -52,17 +55,17 @@ def main() -> None:
     seen = {"evplace": STEPS * PLACES / 2, "plain eager float32": STEPS * BATCH}
     each = {name: type(t)(tuple(s / seen[name] for s in t.seconds)) for name, t in timings.items()}
     report("training, CPU time an image", each, 1e-3, "ms")
-    drive = Traverse(images, np.arange(PLACES) * 33_333, np.full(PLACES, 9), None, {})
+    drive = Traverse(images, np.arange(PLACES) * 33_333, np.full(PLACES, 9))
     learned = train(drive, PlaceRuns(PLACES), steps=1)
     with tempfile.TemporaryDirectory() as folder:
         began = time.perf_counter()
         learned.save(Path(folder) / "map")
         print(f"saving a map of {PLACES} places: {time.perf_counter() - began:.3f} s")
-    scorer = open_scorer(learned)
+    localizer = Localizer(learned)
     taken = []
     for image in images:
         began = time.perf_counter()
-        scorer.rows(image[None])
+        localizer.rows(image[None])
         taken.append(time.perf_counter() - began)
     low, middle, high = (1e3 * value for value in np.percentile(taken, [5, 50, 95]))
     print(f"answering for one image, one thread: median {middle:.2f} ms ({low:.2f} to {high:.2f})")

@@ -13,7 +13,7 @@ import numpy as np
 
 import plain_matchers as plain
 from evplace.matchers import open_matcher
-from evplace.matchers.seqslam import Settings, offsets_of
+from evplace.matchers.seqslam import SeqSLAM, offsets_of
 from evplace.scorers._distances import sad
 from harness import alternate, report
 
@@ -59,7 +59,7 @@ def bench_graph(items: int, rounds: int) -> None:
 def bench_seqslam(items: int, rounds: int) -> None:
     scores = drive(items)[0] - 1
     distances = -scores
-    offsets = offsets_of(Settings())
+    offsets = offsets_of(SeqSLAM())
     assert (whole("seqslam", scores)[7:-7] == plain.seqslam(distances, offsets)).mean() > 0.999
     times = alternate(
         {

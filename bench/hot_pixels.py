@@ -25,9 +25,8 @@ from evplace.drives.to_traverse import open_source, record
 from evplace.evaluation._evaluate import evaluate
 from evplace.imaging.traverse import Traverse, new_traverse
 from evplace.localizer import Localizer
-from evplace.placemap import PlaceMap
+from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
-from evplace.scorers._network.training import PRESETS, train
 from evplace.sources.cleaning import CleaningSettings
 from evplace.sources.readers import open_recording
 from evplace.sources.writers import write_recording
@@ -127,7 +126,7 @@ def main() -> None:
             print(f"correlation  {query:<24} {accuracy:5.1f}", flush=True)
         trained = np.array(
             [
-                accuracies(train(day, places, settings=PRESETS["paper"], seed=seed), made)
+                accuracies(train(day, places, preset="paper", seed=seed), made)
                 for seed in range(arguments.seeds)
             ]
         )

@@ -18,8 +18,10 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from evplace.core import families
 from evplace.evaluation.sweeps import sweep
-from evplace.matchers import Path, open_matcher
+from evplace.localizer import Answers
+from evplace.matchers import Matcher, Path, stepped
 from evplace.scorers._distances import ncc, sad
 from evplace.scorers._seqslam_images import normalise_patches
 
@@ -70,17 +72,25 @@ def average_precision(points: Iterator[tuple[float, Path]], truth: np.ndarray) -
 
 
 def figures(
-    name: str, values: dict[str, Any], distances: np.ndarray, truth: np.ndarray
+    name: str, values: dict[str, Any], distances: np.ndarray, truth: np.ndarray, answers: Answers
 ) -> tuple[float, float]:
-    """(recall@1, average precision) of one matcher."""
+    """(recall@1, average precision) of one matcher's live answers, or of its hindsight."""
     scores, negated = (probabilities(distances), False) if name == "local" else (-distances, True)
     if values.get("m") == "median":  # of the least distances: half the queries' best is good enough
         values = {**values, "m": float(np.median(distances.min(1)))}
-    matcher = open_matcher(name, distances=negated, **values)
-    matcher.extend(scores)
-    recall = right_of(matcher.path(), truth).sum() / truth.any(1).sum()
+    preset = values.get("preset")
+    values = {key: value for key, value in values.items() if key != "preset"}
+    matcher: Matcher = families.make("matchers", name, preset, values)
+    matching = matcher.start(negated)
+    if answers == "live":
+        path, _ = stepped(matching.step, scores)
+    else:
+        matching.extend(scores)
+        path = matching.path()
+    recall = right_of(path, truth).sum() / truth.any(1).sum()
     swept = {key: value for key, value in values.items() if key not in ("tau1", "m")}
-    return recall, average_precision(sweep(name, scores, distances=negated, **swept), truth)
+    points = sweep(families.make("matchers", name, preset, swept), scores, None, None, negated, answers)
+    return recall, average_precision(points, truth)
 
 
 def within(queries: int, references: int, frames: int) -> np.ndarray:
@@ -120,8 +130,9 @@ def main() -> None:
         for title, distances, truth in scenes(data):
             print(f"{title}: {distances.shape[0]} queries, {distances.shape[1]} references")
             for label, (name, values) in MATCHERS.items():
-                recall, precision = figures(name, values, distances, truth)
-                print(f"  {label:<26} recall@1 {recall:6.1%}  average precision {precision:.3f}", flush=True)
+                for answers in ("live", "hindsight"):
+                    recall, precision = figures(name, values, distances, truth, answers)
+                    print(f"  {label:<26} {answers:<9} {recall:6.1%} / {precision:.3f}", flush=True)
 
 
 if __name__ == "__main__":
