@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import dataclasses
 import importlib
+import importlib.util
 import re
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 
 from evplace.cli import _modules
 from evplace.cli._output import ARGUMENT, in_flags
+from evplace.core import families
 
 SRC = Path(__file__).parents[1] / "src"
 
@@ -26,7 +28,7 @@ ORDER = {
     "evplace.core": "errors events grey settings families storage workers drawing",
     "evplace.sources": "frames readers writers cleaning tracks film simulators",
     "evplace.imaging": (
-        "windows resampling representations tones images recipe stream spacing traverse sheets"
+        "windows _resampling representations tones images recipe stream spacing traverse sheets"
     ),
     "evplace.drives": "datasets to_traverse",
     "evplace.scorers": "_search _distances _seqslam_images _network",
@@ -119,3 +121,38 @@ def _flat_fields(kind: type[Any]) -> Iterator[str]:
     for field in dataclasses.fields(kind):
         inner = hints[field.name]
         yield from _flat_fields(inner) if dataclasses.is_dataclass(inner) else (field.name,)
+
+
+FAMILIES = {**families.MODULES, **families.CLASSES}.values()
+
+
+def used_only_inside() -> list[str]:
+    """Modules without an underscore that no other package of ours imports; parts of families have no user."""
+    files = {
+        ".".join(file.relative_to(SRC).with_suffix("").parts): file
+        for file in SRC.rglob("*.py")
+        if not file.name.startswith("_")
+    }
+    named = [(".".join(file.relative_to(SRC).parts[:-1]), imports(file)) for file in SRC.rglob("*.py")]
+    found = []
+    for module in files:
+        package = module.rpartition(".")[0]
+        private = any(part.startswith("_") for part in module.split("."))
+        if private or package in FAMILIES or package.startswith("evplace_lab") or package.endswith(".cli"):
+            continue
+        users = {user for user, names in named if any(f"{name}.".startswith(f"{module}.") for name in names)}
+        if not any(not f"{user}.".startswith(f"{package}.") for user in users):
+            found.append(module)
+    return found
+
+
+def test_a_module_that_only_its_package_uses_begins_with_an_underscore() -> None:
+    assert used_only_inside() == []
+
+
+def test_the_modules_for_parts_of_other_packages_are_there() -> None:
+    text = (SRC.parent / "CONTRIBUTING.md").read_text("utf-8")
+    named = set(re.findall(r"`(evplace(?:\.[a-z]+)+)`", text))
+    assert len(named) > 15
+    for module in named:
+        assert importlib.util.find_spec(module) is not None, module

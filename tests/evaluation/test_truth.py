@@ -151,12 +151,3 @@ def test_blocks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (found.accepts(items) == whole).all()
     assert (found.seen == found.right.any(axis=1)).all()
     assert whole.tolist() == [item >= 0 and bool(found.right[q, item]) for q, item in enumerate(items)]
-
-
-def test_no_overlap_says_both_spans() -> None:
-    track = Track.local([0, 1_000_000], [[0, 0], [1, 1]])
-    assert truth.positions_at([500_000, 9_000_000], track).known.tolist() == [True, False]
-    with pytest.raises(
-        EvaluationError, match=r"track runs from 0\.000 s to 1\.000 s, the images from 5\.000 s to 6"
-    ):
-        truth.positions_at([5_000_000, 6_000_000], track)

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from evplace.imaging.resampling import (
+from evplace.imaging._resampling import (
     AxisMap,
     Resampler,
     Resize,

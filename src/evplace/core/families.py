@@ -18,7 +18,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Any, NamedTuple
 
 from evplace.core import settings
-from evplace.core.errors import EvplaceError, PartError, SettingsError
+from evplace.core.errors import EvplaceError, PartError, SettingsError, UnsupportedError
 
 MODULES = {
     "readers": "evplace.sources.readers",
@@ -89,14 +89,18 @@ def loadable(family: str) -> Iterator[tuple[str, Any]]:
 def recognising(family: str, asks: Callable[[Any], bool], faults: list[EvplaceError]) -> Iterator[str]:
     """The names of the parts that `asks` is true of, our own first.
 
-    One that cannot be loaded, or fails, stops no other; why it did goes into `faults`.
+    One that cannot be loaded, or fails, stops no other; why it did goes into `faults`. UnsupportedError where
+    a part of our own knows what is given, and that it cannot be used.
     """
-    for name in [*_own(family), *sorted(_others(family))]:
+    own = _own(family)
+    for name in [*own, *sorted(_others(family))]:
         try:
             part = load(family, name)
             with blaming(family, part):
                 found = asks(part)
         except EvplaceError as error:
+            if name in own and isinstance(error, UnsupportedError):
+                raise
             faults.append(error)
             continue
         if found:

@@ -288,11 +288,6 @@ def _check_made_so(path: Path, made: Recipe | None, settings: Mapping[str, Any],
     _check_kind(made.kind, str(path), settings)
 
 
-def is_kept(drive: Drive, kind: Kind | None = None) -> bool:
-    """Whether camera images are kept as they are, so that settings of events mean nothing."""
-    return isinstance(recorded_as(kind, drive), Film)
-
-
 def _check_meant(source: Recording | SimulatedRecording | Film, settings: Mapping[str, Any]) -> None:
     _check_kind("frames" if isinstance(source, Film) else "events", str(source.path), settings)
 

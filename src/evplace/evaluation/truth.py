@@ -23,7 +23,6 @@ from evplace.core.errors import EvaluationError, InputError
 from evplace.core.storage import read_array
 from evplace.places import Places
 from evplace.sources.tracks import Track
-from evplace.sources.tracks._apart import apart
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -83,18 +82,6 @@ class Truth:
         mask = np.asarray(seen, np.bool_)
         _check_length(mask, self.n_queries, "seen queries")
         return replace(self, block=lambda part: self.block(part) & mask[part, None], rule=self.rule | rule)
-
-
-def positions_at(t_us: ArrayLike, track: Track, max_gap_s: float = 1.0, max_gap_m: float = 20.0) -> Track:
-    """`track.at` for the times (queries,) of a drive.
-
-    Raises EvaluationError, with both time spans, where not one query has a position.
-    """
-    times = np.asarray(t_us, np.int64)
-    found = track.at(times, max_gap_s, max_gap_m)
-    if not found.known.any():
-        raise EvaluationError(f"no query has a position: {_why(times, track)}")
-    return found
 
 
 def by_places(places: Places, xy: ArrayLike) -> Truth:
@@ -262,12 +249,3 @@ def _near(query: Floats, reference: Floats, radius_m: float) -> Bools:
 def _check_length(values: NDArray[Any], wanted: int, what: str) -> None:
     if len(values) != wanted:
         raise EvaluationError(f"{len(values)} {what} do not fit {wanted} queries")
-
-
-def _why(t_us: NDArray[np.int64], track: Track) -> str:
-    if not len(t_us):
-        return "there is no query"
-    first, last = int(t_us.min()), int(t_us.max())
-    if last < track.t_us[0] or first > track.t_us[-1]:
-        return str(apart(track, first, last))
-    return "its fixes are too far apart in time or space for the times of the queries"

@@ -1,7 +1,7 @@
 """Event images: a window of events as the small image that scorers see (paper, Eq. 3 and section 3.2).
 
 The order is the paper's: a binary image at the sensor's size, blurred with the 3x3 Gaussian, its bottom
-quarter removed, resized to 160x90. Blur, crop and resize are one fused pass (see `resampling`). Images are
+quarter removed, resized to 160x90. Blur, crop and resize are one fused pass (see `_resampling`). Images are
 uint8 in the store, value = round(255 v), and v = value / 255 as float32 in [0, 1] for the network.
 """
 
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from evplace.core import families
 from evplace.core.errors import SettingsError, TraverseError
 from evplace.core.events import Events, Size
+from evplace.imaging._resampling import Resampler, Resize, axis_map
 from evplace.imaging.representations import Representation
-from evplace.imaging.resampling import Resampler, Resize, axis_map
 from evplace.imaging.tones import Tone, toned
 
 

@@ -112,8 +112,8 @@ def test_every_control_works(opened: Open, text: str) -> None:
     assert probe
     found: dict[str, Any] = json.loads(probe[1].replace("&lt;", "<").replace("&gt;", ">"))
     assert found["hidden"] == [True, False]
-    assert found["by_key"] == "events, Algorithm 1: recall 0.000, precision 1.000, tau1 0"
-    assert found["by_pointer"] == "events, Algorithm 1: recall 0.500, precision 0.800, tau1 0.5"
+    assert found["by_key"] == "events, Algorithm 1, live: recall 0.000, precision 1.000, tau1 0"
+    assert found["by_pointer"] == "events, Algorithm 1, live: recall 0.500, precision 0.800, tau1 0.5"
     assert found["hides"] == 1
     assert found["slider"].startswith("Query 7: item")
     assert len(found["images"]) > 16

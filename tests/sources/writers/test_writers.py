@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from evplace.core import families
-from evplace.core.errors import DamagedRecordingError, OutputError
+from evplace.core.errors import DamagedRecordingError, DoubtfulRecordingError, OutputError
 from evplace.core.events import Events
 from evplace.sources.readers import open_recording
 from evplace.sources.writers import write_recording
@@ -47,7 +48,10 @@ def test_round_trip(form: str, each: int, start_us: int, span_us: int, tmp_path:
     assert write_recording(path, packets(events, each), SIZE) == len(events)
     recording = open_recording(path)
     assert (recording.format, recording.size, recording.notes) == (form, SIZE, [])
-    assert same(Events.concatenate(list(recording.packets())), events)
+    read = []
+    with contextlib.suppress(DoubtfulRecordingError):  # all of them in one microsecond are read, then doubted
+        read.extend(recording.packets())
+    assert same(Events.concatenate(read), events)
 
 
 @pytest.mark.parametrize("form", ["aedat4", "evt3"])

@@ -52,7 +52,7 @@ def _topics(path: Path) -> dict[str, str]:
                 fields, data = _record(file, size)
                 if fields[b"op"][0] == CONNECTION:
                     list(_taken(CONNECTION, fields, data, connections))
-    except FAULTS:
+    except (*FAULTS, OSError):  # a damaged index may point where no file reaches
         return {}
     return dict(connections.values())
 
