@@ -8,7 +8,6 @@ found on loading, before it answers anything.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,26 +20,28 @@ from evplace import places as places_of
 from evplace.core import families
 from evplace.core.errors import EvplaceError, InputError, PartError, PlaceMapError
 from evplace.core.settings import to_dict
-from evplace.core.storage import new_folder, read_array, read_bytes, read_json, sha256, write_json
+from evplace.core.storage import new_folder, read_array, write_json
 from evplace.drives.to_traverse import open_traverse
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import MARK as TRAVERSE
 from evplace.imaging.traverse import Traverse
+from evplace.placemap._files import (
+    FORMAT,
+    about_of,
+    check_sums,
+    file_of,
+    read_content,
+    write_content,
+    write_sums,
+)
+from evplace.placemap._files import MARK as MARK
 from evplace.places import Places
 from evplace.scorers import REFERENCES, Content, Descriptor, Learned, Learning, Scorer, scorer_of, usable
 from evplace.sources.cleaning import MaskSource
 from evplace.sources.tracks import Track
 
-FORMAT = "evplace-map-2"
-OLD_FORMAT = "evplace-map-1"
-"""Its recipe and scorer lie in pieces in `settings`."""
-SUMS = "SHA256SUMS"
-MARK = "map.json"
-"""What tells a folder that was written here from any other: only such a one is replaced."""
 MOST_IMAGES = 100_000_000
 """Images of a drive that are believed: half a year at 1/60 s would be more."""
-_NAME = re.compile(r"[a-z][a-z0-9_-]*(\.[a-z0-9]+)?")
-"""What scorers may call their content."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ class PlaceMap:
         """Write the folder `path`; OutputError where it exists or cannot be written."""
         with new_folder(path, overwrite, MARK) as folder:
             for name, value in self.content.items():
-                _write_content(folder, name, value)
+                write_content(folder, name, value)
             columns = [self.items.place, *self.items.position.T, self.items.heading_deg]
             np.save(folder / "items.npy", np.stack(columns, axis=1).astype(np.float64))
             np.save(folder / "drive.npy", self.drive)
@@ -163,11 +164,10 @@ class PlaceMap:
                 **self.settings,
                 "places": self.places.to_dict(),
                 "items": "places" if self.items.are_places else "images",
-                "content": [_file_of(name, value) for name, value in self.content.items()],
+                "content": [file_of(name, value) for name, value in self.content.items()],
             }
             write_json(folder / MARK, description)
-            sums = [f"{sha256(file)}  {file.name}\n" for file in sorted(folder.iterdir())]
-            (folder / SUMS).write_text("".join(sums), "ascii")
+            write_sums(folder)
 
     @classmethod
     def load(cls, path: str | Path, scorer: Scorer | Descriptor | None = None) -> PlaceMap:
@@ -180,14 +180,14 @@ class PlaceMap:
         if not (folder / MARK).is_file():
             raise PlaceMapError(f"{folder} is no map: a map is a folder that `evplace train` has written")
         try:
-            about = _about(folder, what)
-            _check_sums(folder, what, {MARK, "items.npy", "drive.npy", *about["content"]})
+            about = about_of(folder, what)
+            check_sums(folder, what, {MARK, "items.npy", "drive.npy", *about["content"]})
             place_map = cls(
                 scorer=_scorer_from(about["scorer"], what) if scorer is None else scorer,
                 places=places_of.from_dict(about["places"]),
                 items=_items(folder, about, what),
                 drive=read_array(folder / "drive.npy", what),
-                content={name.removesuffix(".npy"): _read(folder / name, what) for name in about["content"]},
+                content=read_content(folder, about["content"], what),
                 image_shape=tuple(about["image_shape"]),
                 recipe=None if about["recipe"] is None else Recipe.from_dict(about["recipe"]),
                 zone=None if about["zone"] is None else (about["zone"][0], about["zone"][1]),
@@ -304,62 +304,6 @@ def _scorer_from(values: Mapping[str, Any], what: str) -> Scorer | Descriptor:
     return part
 
 
-_SHAPE: dict[str, tuple[type, ...]] = {
-    "scorer": (dict,), "places": (dict,), "recipe": (dict, type(None)), "image_shape": (list,),
-    "zone": (list, type(None)), "info": (dict,), "items": (str,), "content": (list,),
-}  # fmt: skip
-"""What map.json holds: a name and the kinds of JSON that it may be."""
-
-
-def _about(folder: Path, what: str) -> dict[str, Any]:
-    """map.json, each entry of the kind that it must be; of the format before, as of this one."""
-    about = read_json(folder / MARK, what)
-    if about.get("format") == OLD_FORMAT:
-        about = _of_old_format(about, (folder / "references.npy").exists(), what)
-    elif about.get("format") != FORMAT:
-        raise PlaceMapError(f"{what} has the format {about.get('format')!r}, this version reads {FORMAT}")
-    for name, kinds in _SHAPE.items():
-        if name not in about or not isinstance(about[name], kinds):
-            raise PlaceMapError(f"{what} is damaged: '{name}' in {MARK} is missing or of a wrong kind")
-    shape, zone, scorer = about["image_shape"], about["zone"], about["scorer"]
-    if not (len(shape) in (2, 3) and all(type(side) is int and 0 < side < 1 << 16 for side in shape)):
-        raise PlaceMapError(f"{what} is damaged: images of shape {shape!r}")
-    if zone is not None and not (
-        len(zone) == 2 and type(zone[0]) is int and 0 <= zone[0] <= 60 and isinstance(zone[1], bool)
-    ):
-        raise PlaceMapError(f"{what} is damaged: {zone!r} is no UTM zone")
-    if not isinstance(scorer.get("name"), str) or not isinstance(scorer.get("settings"), dict):
-        raise PlaceMapError(f"{what} is damaged: its scorer is {scorer!r}")
-    names = about["content"]
-    if not all(isinstance(name, str) and _may_be_called(name) for name in names) or len(set(names)) < len(
-        names
-    ):
-        raise PlaceMapError(f"{what} is damaged: its content is {about['content']!r}")
-    return about
-
-
-def _of_old_format(about: dict[str, Any], has_references: bool, what: str) -> dict[str, Any]:
-    settings = about.get("settings")
-    if not isinstance(settings, dict):
-        raise PlaceMapError(f"{what} is damaged: 'settings' in {MARK} is missing or of a wrong kind")
-    of_scorer = settings.get("scorer") or {}
-    if "train" in settings:
-        trained = settings["train"]
-        of_scorer = trained if about.get("scorer") == "network" else {**of_scorer, "network": trained}
-    recipe = {key: settings.get(key) for key in ("windows", "images", "cleaning")}
-    recipe |= {"kind": settings.get("input"), "size": settings.get("sensor")}
-    return {
-        "scorer": {"name": about.get("scorer"), "package": "evplace", "settings": of_scorer},
-        "places": about.get("places"),
-        "recipe": None if settings.get("images") is None else recipe,
-        "image_shape": settings.get("image_shape"),
-        "zone": settings.get("zone"),
-        "info": {key: settings[key] for key in ("source", "spacing") if settings.get(key) is not None},
-        "items": "images" if has_references else "places",
-        "content": ["references.npy"] if has_references else ["network.onnx", "weights.safetensors"],
-    }
-
-
 def _items(folder: Path, about: Mapping[str, Any], what: str) -> Items:
     columns = read_array(folder / "items.npy", what)
     if columns.ndim != 2 or columns.shape[1] != 4 or columns.dtype != np.float64 or not len(columns):
@@ -397,45 +341,3 @@ def _check_fit(place_map: PlaceMap, what: str) -> None:
             f"{what} is damaged: references of shape {images.shape} for {len(items)} items of "
             f"{place_map.image_shape}"
         )
-
-
-def _file_of(name: str, value: NDArray[Any] | bytes) -> str:
-    file = name if isinstance(value, bytes) else f"{name}.npy"
-    if not _may_be_called(file):
-        raise PlaceMapError(f"a scorer cannot call its content '{name}': lower-case letters and one suffix")
-    return file
-
-
-def _may_be_called(file: str) -> bool:
-    return _NAME.fullmatch(file) is not None and file not in (MARK, "items.npy", "drive.npy")
-
-
-def _write_content(folder: Path, name: str, value: NDArray[Any] | bytes) -> None:
-    file = folder / _file_of(name, value)
-    if isinstance(value, bytes):
-        file.write_bytes(value)
-    else:
-        np.save(file, value)
-
-
-def _read(file: Path, what: str) -> NDArray[Any] | bytes:
-    if file.suffix == ".npy":
-        return read_array(file, what, memory_mapped=True)
-    return file.read_bytes()
-
-
-def _check_sums(folder: Path, what: str, needed: set[str]) -> None:
-    """PlaceMapError where SHA256SUMS does not name just the files that are read, or a byte has changed."""
-    try:
-        lines = read_bytes(folder / SUMS, what).decode("ascii").splitlines()
-        sums = {name: wanted for wanted, name in (line.split("  ", 1) for line in lines)}
-    except (InputError, ValueError) as error:
-        raise PlaceMapError(f"{what} has no readable {SUMS}: train it again ({error})") from error
-    for name in sorted(needed | set(sums)):
-        file = folder / name
-        if name not in sums or name not in needed:
-            raise PlaceMapError(f"{what} is damaged: {SUMS} and {MARK} do not name the same files ({name})")
-        if not file.is_file() or file.is_symlink():
-            raise PlaceMapError(f"{what} lacks {name}: copy it again or train it again")
-        if sha256(file) != sums[name]:
-            raise PlaceMapError(f"{what} is damaged: {name} has changed since it was saved; copy it again")
