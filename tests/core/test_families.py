@@ -53,10 +53,10 @@ def others(monkeypatch: pytest.MonkeyPatch) -> Iterator[Others]:
         forget()
         return module
 
-    def entry_points(group: str) -> list[EntryPoint]:
+    def installed(group: str) -> list[EntryPoint]:
         return [point for point in points if point.group == group]
 
-    monkeypatch.setattr(families, "entry_points", entry_points)
+    monkeypatch.setattr(families, "installed", installed)
     forget()
     yield install
     forget()
@@ -382,7 +382,7 @@ def test_a_command_that_cannot_be_loaded(
         EntryPoint("odd", "nowhere.odd", "evplace.commands"),
         EntryPoint("bad", "bad", "evplace.commands"),
     ]
-    monkeypatch.setattr("evplace.cli.entry_points", lambda group: points)
+    monkeypatch.setattr(families, "installed", lambda group: points)
     assert main(["--help"]) == 0
     assert "odd       cannot be loaded" in capsys.readouterr().out
     assert main(["odd"]) == 2

@@ -12,12 +12,12 @@ import difflib
 import importlib
 import os
 import sys
-from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from evplace.cli._output import note
+from evplace.core import families
 from evplace.core.errors import EvplaceError, PartError
 
 INTERRUPTED = 130
@@ -48,13 +48,13 @@ def commands() -> dict[str, str]:
 def _modules() -> dict[str, str]:
     """Command -> module: our own files, and the entry points of other packages."""
     own = {file.stem: f"evplace.cli.{file.stem}" for file in Path(__file__).parent.glob("[a-z]*.py")}
-    return {entry.name: entry.value for entry in entry_points(group="evplace.commands")} | own
+    return {entry.name: entry.value for entry in families.installed("evplace.commands")} | own
 
 
 def _run(arguments: list[str]) -> int:
-    known = commands()
+    modules = _modules()
     if not arguments or arguments[0] in ("-h", "--help"):
-        print(_overview(known))
+        print(_overview(commands()))
         return 0
     if arguments[0] == "--version":
         from evplace import __version__
@@ -62,11 +62,11 @@ def _run(arguments: list[str]) -> int:
         print(f"evplace {__version__}")
         return 0
     name = arguments[0]
-    if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
+    if name not in modules:
+        close = difflib.get_close_matches(name, modules, n=1)
         hint = f"did you mean '{close[0]}'? " if close else ""
-        raise EvplaceError(f"unknown command '{name}': {hint}commands are {', '.join(known)}")
-    module = _loaded(name)
+        raise EvplaceError(f"unknown command '{name}': {hint}commands are {', '.join(sorted(modules))}")
+    module = _loaded(name, modules[name])
     from evplace.cli._parse import parse
 
     parsed = parse(module, name, arguments[1:])
@@ -93,8 +93,7 @@ def _overview(known: dict[str, str]) -> str:
     )
 
 
-def _loaded(name: str) -> Any:
-    module = _modules()[name]
+def _loaded(name: str, module: str) -> Any:
     try:
         return importlib.import_module(module)
     except Exception as error:

@@ -14,7 +14,7 @@ import inspect
 import pkgutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, entry_points
 from typing import Any, NamedTuple
 
 from evplace.core import settings
@@ -202,12 +202,24 @@ def _others(family: str) -> dict[str, EntryPoint]:
     return _entry_points(family)[0]
 
 
+def installed(group: str) -> EntryPoints:
+    """The entry points of all packages in a group such as "evplace.matchers"."""
+    found: EntryPoints = _read_once().select(group=group)
+    return found
+
+
+@functools.cache
+def _read_once() -> Any:  # before Python 3.12 they are no EntryPoints yet
+    """To find those of one group opens a file of every package, as those of all groups do."""
+    return entry_points()
+
+
 @functools.cache
 def _entry_points(family: str) -> tuple[dict[str, EntryPoint], list[EntryPoint]]:
     """Those of other packages by their names; and those whose name is ours, or a package's before them."""
     found: dict[str, EntryPoint] = {}
     hidden = []
-    for entry in sorted(entry_points(group=f"evplace.{family}"), key=_distribution):
+    for entry in sorted(installed(f"evplace.{family}"), key=_distribution):
         if entry.name in _own(family) or entry.name in found:
             hidden.append(entry)
         else:
