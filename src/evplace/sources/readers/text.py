@@ -1,9 +1,9 @@
-"""Text with one event a line, also inside .zip or .gz: `t x y p` (as in rpg's data sets), `x y p t` or any
-other order that a line of names, the values or the caller tells (see `_order`).
+"""Text with one event a line, also inside .zip or .gz: `t x y p`, `x y p t`, or columns in another order.
 
-Numbers are separated by blanks, tabs, commas or semicolons, and may stand in quotes; a polarity may be a
-word. A first line of two numbers is the sensor's width and height; remarks (`#`, `%`) and names (`x@320`) may
-state it too. A name may give the unit of time (`t_us`).
+The order is told by a line of names, by the values, or by the caller (see `_order`). Numbers are separated by
+blanks, tabs, commas or semicolons, and may stand in quotes; a polarity may be a word. A first line of two
+numbers is the sensor's width and height; remarks (`#`, `%`) and names (`x@320`) may state it too. A name may
+give the unit of time (`t_us`).
 """
 
 from __future__ import annotations
