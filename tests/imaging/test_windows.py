@@ -13,7 +13,14 @@ from hypothesis import strategies as st
 
 from evplace.core.errors import RecordingError, SettingsError
 from evplace.core.events import Events
-from evplace.imaging.windows import CountWindows, TimeWindows, Window, WindowSettings, open_windows
+from evplace.imaging.windows import (
+    CountWindows,
+    TimeWindows,
+    Window,
+    WindowSettings,
+    open_windows,
+    windows_before,
+)
 
 
 def events_at(t_us: list[int]) -> Events:
@@ -98,3 +105,18 @@ def test_no_events_no_windows() -> None:
 def test_windows_that_cannot_be_are_refused(settings: dict[str, object]) -> None:
     with pytest.raises(SettingsError):
         WindowSettings(**settings)  # type: ignore[arg-type]
+
+
+@given(
+    st.lists(st.integers(0, 200), max_size=40).map(sorted),
+    st.lists(st.integers(-50, 300), max_size=10),
+    st.sampled_from([WindowSettings("1/50000"), WindowSettings("1/10"), WindowSettings(count=3)]),
+)
+def test_windows_before_given_times(times: list[int], ends: list[int], settings: WindowSettings) -> None:
+    cut = windows_before(np.array(ends, np.int64), events_at(times), settings)
+    for end, window in zip(ends, cut, strict=True):
+        before = [t_us for t_us in times if t_us <= end]
+        if settings.count:
+            assert window.t_us.tolist() == before[-settings.count :]
+        else:
+            assert window.t_us.tolist() == [t for t in before if t > end - settings.seconds * 1_000_000]

@@ -224,10 +224,10 @@ def _loaded(path: str | Path) -> NDArray[Any]:
 
 
 def _shape_fault(shape: tuple[int, ...], n_queries: int, n_items: int, rows: str) -> str:
-    told = shape if rows == "queries" else shape[::-1]
+    in_order = shape if rows == "queries" else shape[::-1]
     other = "references" if rows == "queries" else "queries"
     hint = f': it fits with rows="{other}"' if shape == (n_items, n_queries) else ""
-    return f"its shape {told} does not fit {n_queries} queries and {n_items} items{hint}"
+    return f"its shape {in_order} does not fit {n_queries} queries and {n_items} items{hint}"
 
 
 def _positions(xy: ArrayLike) -> Floats:

@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evplace.core.errors import RecordingError, SettingsError
 from evplace.core.events import Events
@@ -155,3 +156,17 @@ def open_windows(settings: WindowSettings, origin_us: int | None = None) -> Time
     if settings.count:
         return CountWindows(settings.count)
     return TimeWindows(settings.seconds, origin_us)
+
+
+def windows_before(t_us: NDArray[np.int64], events: Events, settings: WindowSettings) -> Iterator[Events]:
+    """For each time (n,) in microseconds the events of the last dt up to it, or the last `count` of them.
+
+    That is for images at times that are given; these windows may overlap. Open on the left, as above.
+    """
+    ends = np.searchsorted(events.t_us, t_us, "right")
+    if settings.count:
+        starts = np.maximum(ends - settings.count, 0)
+    else:
+        starts = np.searchsorted(events.t_us, t_us - round(settings.seconds * MICROSECONDS), "right")
+    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
+        yield events[start:end]

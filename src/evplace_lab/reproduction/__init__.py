@@ -124,7 +124,7 @@ def _check(name: str, family: ModuleType, choice: Choice, workers: int) -> None:
 
 
 def _of_city(progress: Progress | None) -> Callable[[CityProgress], None] | None:
-    """The city's own progress, told as ours: in thousandths."""
+    """The city's own progress as ours, in thousandths."""
     if progress is None:
         return None
     return lambda at: progress(round(at.share * 1000), 1000, f"driving {at.drive}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,7 +18,7 @@ from evplace.imaging.images import Imager, ImageSettings
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.tones import toned
 from evplace.imaging.traverse import Traverse, TraverseWriter
-from evplace.imaging.windows import WindowSettings
+from evplace.imaging.windows import WindowSettings, windows_before
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid
 from evplace.sources.readers import open_recording
@@ -114,8 +113,8 @@ class Cities:
 
     def _like(self, **changed: Any) -> CitySettings:
         """The settings of drives like the benchmark's."""
-        told = {key: value for key, value in self.settings.items() if key != "version"}
-        return make(CitySettings, {**told, **changed})
+        own = {key: value for key, value in self.settings.items() if key != "version"}
+        return make(CitySettings, {**own, **changed})
 
     def _folder(self, drive: str, case: Case) -> Path:
         if case.windows is not None or case.images is not None:
@@ -141,23 +140,12 @@ class Cities:
             events = Events.concatenate(list(recording.packets()))
             writer.recipe = Recipe("events", recording.size, windows, images)
             imager = Imager(recording.size, images)
-            for t_us, window in zip(given.t_us.tolist(), _windows(events, given, windows), strict=True):
+            cut = windows_before(given.t_us, events, windows)
+            for t_us, window in zip(given.t_us.tolist(), cut, strict=True):
                 imager.add(window)
                 writer.add(imager.image(t_us), t_us, len(window))
             writer.track = given.track
             writer.close()
-
-
-def _windows(events: Events, given: Traverse, windows: WindowSettings) -> Iterator[Events]:
-    """For each image, the events of the last dt before its time, or the last `count` of them."""
-    ends = np.searchsorted(events.t_us, given.t_us, "right")
-    if windows.count:
-        starts = np.maximum(ends - windows.count, 0)
-    else:
-        dt_us = round(windows.seconds * 1_000_000)
-        starts = np.searchsorted(events.t_us, given.t_us - dt_us, "right")
-    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
-        yield events[start:end]
 
 
 def _drives(cases: list[Case]) -> list[tuple[str, int]]:

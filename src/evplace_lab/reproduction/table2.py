@@ -68,15 +68,15 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
     rows = document["rows"]
     main = [row for row in rows if row["input"] in MAIN_INPUTS]
     fair = [row for row in rows if row["input"] not in MAIN_INPUTS or row["input"] == "colour"]
-    for rule, told in RULES.items():
-        yield from _table(f"Accuracy in %, {told}", [row for row in main if row["rule"] == rule], "mean")
+    for rule, words in RULES.items():
+        yield from _table(f"Accuracy in %, {words}", [row for row in main if row["rule"] == rule], "mean")
     by_places = [row for row in main if row["rule"] == "places"]
     yield from _table("Accuracy in % on queries of places that the map has", by_places, "seen")
     yield from _table("Rejected queries in %", by_places, "rejected")
     if any(row["input"] != "colour" for row in fair):
-        for rule, told in RULES.items():
+        for rule, words in RULES.items():
             of_rule = [row for row in fair if row["rule"] == rule]
-            yield from _table(f"Colour's fair chance: accuracy in %, {told}", of_rule, "mean")
+            yield from _table(f"Colour's fair chance: accuracy in %, {words}", of_rule, "mean")
 
 
 def _cells(choice: Choice) -> Iterator[tuple[Recipe, str, str, list[Case]]]:
@@ -121,5 +121,5 @@ def _table(title: str, rows: list[dict[str, Any]], figure: str) -> Iterator[Tabl
 
 def _paper(line: list[dict[str, Any]]) -> str:
     """The paper's numbers for events and for colour, beside our inputs of that name."""
-    told = {inputs()[cell["input"]].paper: cell["paper"] for cell in line if cell["paper"] is not None}
-    return ", ".join(f"{told[kind]:.1f}" for kind in ("events", "colour") if kind in told)
+    theirs = {inputs()[cell["input"]].paper: cell["paper"] for cell in line if cell["paper"] is not None}
+    return ", ".join(f"{theirs[kind]:.1f}" for kind in ("events", "colour") if kind in theirs)
