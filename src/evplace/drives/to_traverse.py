@@ -289,18 +289,19 @@ def _check_made_so(path: Path, made: Recipe | None, settings: Mapping[str, Any],
 
 
 def _check_meant(source: Recording | SimulatedRecording | Film, settings: Mapping[str, Any]) -> None:
-    _check_kind("frames" if isinstance(source, Film) else "events", str(source.path), settings)
+    is_film = isinstance(source, Film)
+    instead = ", or add `kind=events`" if is_film else ""
+    _check_kind("frames" if is_film else "events", str(source.path), settings, instead)
 
 
-def _check_kind(kind: Kind | None, path: str, settings: Mapping[str, Any]) -> None:
+def _check_kind(kind: Kind | None, path: str, settings: Mapping[str, Any], instead: str = "") -> None:
     """SettingsError where a setting is named that means nothing for camera images, or for events."""
     idle = [name for name in settings if name in (OF_EVENTS if kind == "frames" else ("tone",))]
     if idle:
+        what = "camera images" if kind == "frames" else "events"
+        mean, it = ("means", "it") if len(idle) == 1 else ("mean", "them")
         named = " and ".join(f"`{name}`" for name in idle)
-        what, hint = ("camera images", ", or add `kind=events`") if kind == "frames" else ("events", "")
-        raise SettingsError(
-            f"{named} mean{'s' * (len(idle) == 1)} nothing for the {what} of {path}: leave it out{hint}"
-        )
+        raise SettingsError(f"{named} {mean} nothing for the {what} of {path}: leave {it} out{instead}")
 
 
 def _refuse(what: str, arguments: Mapping[str, object]) -> None:
