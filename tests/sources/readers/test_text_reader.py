@@ -188,6 +188,23 @@ def test_what_cannot_be_known_is_asked_for(name: str, tmp_path: Path) -> None:
         assert np.array_equal(getattr(back, field), getattr(SOME, field)), field
 
 
+@pytest.mark.parametrize(
+    ("line", "odd"),
+    [
+        ("{t},{x},{y},+", "+"),
+        ("2023-05-01T10:00:00.5Z,{x},{y},{p}", "2023-05-01T10:00:00.5Z"),
+        ("{t},{x},{y},rising", "rising"),
+        ("{t} us,{x},{y},{p}", "us"),
+        ("0x10,{x},{y},{p}", "0x10"),
+    ],
+)
+def test_a_word_below_names_that_is_no_number_is_named(line: str, odd: str, tmp_path: Path) -> None:
+    path = tmp_path / "events.csv"
+    path.write_text("t,x,y,polarity\n" + lines(line + "\n"))
+    with pytest.raises(RecordingError, match=rf"line 2 \('.*'\) is no event: '{re.escape(odd)}'"):
+        open_recording(path)
+
+
 def test_columns_that_the_caller_gives_must_fit(tmp_path: Path) -> None:
     path = text(tmp_path, SOME)
     with pytest.raises(RecordingError, match=r"line 2 \('.*'\): it has 4 columns, not the 5"):
@@ -196,9 +213,12 @@ def test_columns_that_the_caller_gives_must_fit(tmp_path: Path) -> None:
     assert np.array_equal(swapped.x, SOME.y)
 
 
-def test_decimal_commas_are_not_read(tmp_path: Path) -> None:
+@pytest.mark.parametrize("mark", [";", "\t", " ", " ; "])
+@pytest.mark.parametrize("seconds", ["{s:.6f}", "{s:.6e}"])
+def test_decimal_commas_are_not_read(mark: str, seconds: str, tmp_path: Path) -> None:
     path = tmp_path / "events.csv"
-    path.write_text("t;x;y;p\n" + lines("{s:.6f};{x};{y};{p}\n").replace(".", ","))
+    row = mark.join([seconds, "{x}", "{y}", "{p}"])
+    path.write_text(mark.join("txyp") + "\n" + lines(row + "\n").replace(".", ","))
     with pytest.raises(UnsupportedError, match=r"line 2 .* has decimal commas"):
         open_recording(path)
 

@@ -125,12 +125,15 @@ def _layout(path: Path, member: str | None, hints: Hints, rows: int = SAMPLE) ->
     """
     with opened(path, member) as file:
         head = file.read(BYTES)
-    top = _top(head) if is_text(head[:HEAD]) else None
+    try:
+        top = _top(head) if is_text(head[:HEAD]) else None
+    except _order.UnclearError as error:
+        raise RecordingError(f"{path}: {error}") from error
     if top is None:
         return None
     columns = len(_cells(top.first))
     where = f"{path}: line {top.lines + 1} ('{printable(top.first[:60])}')"
-    if ";" in top.first and "," in top.first:
+    if _has_decimal_commas(top.first):
         raise UnsupportedError(f"{where} has decimal commas, which are not read: write numbers with points")
     names = [""] * (columns - len(top.names)) + top.names if 0 <= columns - len(top.names) <= 1 else []
     size = hints.size or top.size
@@ -145,7 +148,10 @@ def _layout(path: Path, member: str | None, hints: Hints, rows: int = SAMPLE) ->
 
 
 def _top(head: bytes) -> _Top | None:
-    """What stands before the first line of four numbers or more; None where there is no such line."""
+    """What stands before the first line of four numbers or more; None where there is no such line.
+
+    UnclearError where names of all four are followed by a line that holds numbers, but not only.
+    """
     names: list[str] = []
     size, position = None, 0
     for number, raw in enumerate(head.split(b"\n")):
@@ -157,8 +163,11 @@ def _top(head: bytes) -> _Top | None:
         stated = SIZE.search(line) if remark else re.fullmatch(r"(\d{1,5})[\s,;]+(\d{1,5})", line)
         if stated is not None and (remark is not None or number == 0):
             size = _possible(int(stated.group(1)), int(stated.group(2)))
+        elif remark is None and any(map(_is_number, words)) and _are_complete(names):
+            odd = next((f": '{printable(word[:30])}'" for word in words if not _is_number(word)), "")
+            raise _order.UnclearError(f"line {number + 1} ('{printable(line[:60])}') is no event{odd}")
         elif words and len(said := _named_cells(line[remark.end() :] if remark else line)) >= 4:
-            if remark is None or _order.complete(_order.named(said)) is not None:
+            if remark is None or _are_complete(said):
                 names = said
         elif words and remark is None:
             return None
@@ -166,9 +175,19 @@ def _top(head: bytes) -> _Top | None:
     return None
 
 
+def _are_complete(names: list[str]) -> bool:
+    return _order.complete(_order.named([name.partition("@")[0] for name in names])) is not None
+
+
 def _cells(line: str) -> list[str]:
     """The words of a line of numbers."""
     return [word for word in re.split(r"[\s,;\"']+", line) if word]
+
+
+def _has_decimal_commas(line: str) -> bool:
+    """Whether commas stand within numbers, not between them."""
+    words = [word for word in re.split(r"[\s;\"']+", line) if word]
+    return len(words) >= 4 and any(re.fullmatch(r"[+-]?\d+,\d+(e[+-]?\d+)?", word) for word in words)
 
 
 def _named_cells(line: str) -> list[str]:
