@@ -20,7 +20,7 @@ import tyro
 
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, remarks
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_preset_of
-from evplace.core import settings as settings_room
+from evplace.core import settings
 from evplace.core.errors import DamagedRecordingError
 from evplace.core.events import Events
 from evplace.sources.film import open_film
@@ -58,8 +58,8 @@ class Args(SettingsFlags):
 
 def run(args: Args) -> int:
     """Simulate and write."""
-    preset = settings_room.preset_of("the sensor", PRESETS, args.preset)
-    sensor = settings_room.make(SensorSettings, dict(args.set), preset)
+    preset = settings.preset_of("the sensor", PRESETS, args.preset)
+    sensor = settings.make(SensorSettings, dict(args.set), preset)
     film = open_film(args.film, args.fps, args.time_unit)
     packets = _Counted(simulate(film, film.size, sensor, args.seed))
     fault = None
@@ -74,7 +74,7 @@ def run(args: Args) -> int:
         "events": events,
         "width": film.size[0],
         "height": film.size[1],
-        "sensor": settings_room.to_dict(sensor),
+        "sensor": settings.to_dict(sensor),
         "fault": fault,
     }
     if args.json:
