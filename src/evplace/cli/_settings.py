@@ -114,6 +114,7 @@ class Part:
         changed = settings.changed(preset) if preset is not None else []
         sources = dict.fromkeys(changed, f"preset {getattr(args, self.preset, None)}")
         sources |= dict.fromkeys(of_file, file) | {name: "flag" for name, _ in given[len(of_file) :]}
+        # What is made of settings is a dataclass, which its type does not say.
         names = [field.name for field in dataclasses.fields(made)]  # type: ignore[arg-type]
         return {f"{self.pairs}.{name}": (getattr(made, name), sources.get(name, "default")) for name in names}
 

@@ -81,13 +81,13 @@ def preset_of(what: str, presets: Mapping[str, S], name: str | None) -> S | None
 
 def changed(settings: object) -> list[str]:
     """The fields of a dataclass that differ from its defaults."""
-    plain = type(settings)()
+    plain = type(settings)()  # a dataclass, which `object` does not say
     names = [field.name for field in dataclasses.fields(plain)]  # type: ignore[arg-type]
     return [name for name in names if getattr(settings, name) != getattr(plain, name)]
 
 
 def to_dict(settings: object) -> dict[str, Any]:
-    """The resolved settings as plain values, ready for JSON."""
+    """The resolved settings, a dataclass of any kind, as plain values, ready for JSON."""
     plain: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(settings)))  # type: ignore[call-overload]
     return plain
 

@@ -92,6 +92,7 @@ class Traverse:
             masked = (folder / "mask.npy").exists()
             mask = read_array(folder / "mask.npy", what) if masked else None
             track = _load_track(folder, t_us, about.get("track"), what)
+            # Its own checks refuse an `info` of another kind.
             return cls(images, t_us, counts, track, recipe, about.get("info"), mask)  # type: ignore[arg-type]
         except SettingsError as error:
             raise TraverseError(f"{what} is damaged: {error}") from error
