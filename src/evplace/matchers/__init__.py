@@ -144,19 +144,13 @@ class Route(NamedTuple):
 
 
 class Following(Protocol):
-    """One traverse being matched by a matcher that knows the route; see Matching."""
+    """One traverse being matched live by a matcher that knows the route, in flat memory."""
 
-    def step(self, row: Row, seen: Seen) -> Answer | None:
-        """Take the next query; say what is known by now."""
+    def step(self, row: Row, seen: Seen) -> list[Answer]:
+        """Take the next query; say what has become known, of it or of earlier ones."""
 
     def finish(self) -> list[Answer]:
         """The drive is over: the answers that were still to come."""
-
-    def extend(self, rows: Rows, seen: Sequence[Seen]) -> None:
-        """Take many queries at once."""
-
-    def path(self) -> Path:
-        """The answers for all queries so far, in hindsight."""
 
 
 @runtime_checkable
@@ -168,6 +162,9 @@ class RouteMatcher(Protocol):
 
     def follow(self, route: Route, distances: bool = False) -> Following:
         """Begin a traverse."""
+
+    def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
+        """The answers for all queries of a traverse, once all are known."""
 
 
 class Sweep(NamedTuple):
