@@ -31,10 +31,10 @@ ORDER = {
         "windows _resampling representations tones images recipe stream spacing traverse sheets"
     ),
     "evplace.drives": "datasets to_traverse",
-    "evplace.scorers": "_search _distances _seqslam_images _network",
+    "evplace.scorers": "_search _reduction _distances _seqslam_images _network",
     "evplace.scorers._network": "network network_onnx augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
-    "evplace_lab": "city reproduction report cli",
+    "evplace_lab": "city descriptor reproduction report cli",
 }
 """Package -> its parts in the order of the data: a part imports only parts before it, or files of its own."""
 
