@@ -15,6 +15,8 @@ from evplace_lab.descriptor.bursts import Bursts
 
 PAIRS = 0.7
 """Share of images that are the mean of two neighbours, as a map and a query use them."""
+ONE_SENSOR = 0.8
+"""Share of places that one sensor sees in all drives, as a map and a query are made by one."""
 APART = 2
 """Places to either side that stand for a place in another drive, so that no two views are quite alike."""
 
@@ -50,7 +52,11 @@ def _of_route(
     place = rng.choice(n_places, (places, 1), replace=places > n_places)
     place = np.clip(place + rng.integers(-APART, APART + 1, shape), 0, n_places - 2)
     drive = np.broadcast_to(np.arange(n_drives), shape)
-    sensor = rng.integers(0, n_sensors, shape)
+    sensor = np.where(
+        rng.random((places, 1)) < ONE_SENSOR,
+        rng.integers(0, n_sensors, (places, 1)),
+        rng.integers(0, n_sensors, shape),
+    )
     one = images[drive, place, sensor].astype(np.float32)
     two = images[drive, place + 1, sensor].astype(np.float32)
     paired = (rng.random(shape) < PAIRS)[..., None, None]

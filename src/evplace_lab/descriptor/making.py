@@ -26,7 +26,7 @@ from evplace_lab.descriptor.judging import recalls
 VERSION = 1
 """Counts up whenever the same settings give other images or other weights."""
 UNSEEN = (201, 202, 203)
-"""Seeds of two towns and three halls that no training sees."""
+"""Seeds of two towns and of halls that no training sees."""
 Progress = Callable[[int, int, str], None]
 """Called with (steps done, steps in all, what is being done)."""
 
@@ -88,7 +88,9 @@ def train_seed(folder: Path, recipe: Recipe, seed: int, progress: Progress) -> d
         lambda step, steps, loss: progress(step, steps, f"seed {seed}, loss {loss:.3f}"),
         out / "training.safetensors",
     )
-    network = train_descriptor(towns, TrainingSettings(steps=recipe.steps, seed=seed), watched, recipe.key)
+    network = train_descriptor(
+        towns, TrainingSettings(steps=recipe.steps, seed=seed), watched, f"{VERSION} {recipe}"
+    )
     about = wanted | {"cpu_s": round(time.process_time() - began)}
     write_descriptor(out, as_arrays(network), about)
     return read_json(out / ABOUT, "the description of a descriptor")

@@ -1,7 +1,7 @@
-"""What a window of frames becomes: the small image of an event camera, of a film, or of edges.
+"""What a window of frames becomes: the small image of an event camera, of a film, of a frame or of its edges.
 
 An event camera sees linear light. A film is events between gamma-coded frames of 8 bits, with their noise and
-what JPEG leaves of them. Edges are those of a single frame.
+what JPEG leaves of them; a frame and edges are what an ordinary camera gives without any events.
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ from evplace_lab.city.camera import ColourCamera, grey, luminance
 SIZE = (80, 45)
 """Columns and rows of the small image."""
 Radiance = NDArray[np.float32]
-Kind = Literal["ideal", "events", "film", "edges"]
-KINDS: tuple[Kind, ...] = ("ideal", "events", "film", "edges")
-SHARES = (0.25, 0.4, 0.27, 0.08)
+Kind = Literal["ideal", "events", "film", "frame", "edges"]
+SHARES: dict[Kind, float] = {"ideal": 0.23, "events": 0.38, "film": 0.25, "frame": 0.07, "edges": 0.07}
+"""How often each kind is drawn."""
+FROM_FRAMES = ("frame", "edges")
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,9 @@ class Sensor:
 
     def image(self, frames: list[Radiance], times_us: list[int], seed: int) -> NDArray[np.uint8]:
         """(45, 80) of the window from the first frame (H, W, 3) to the last; `seed` draws all noise."""
-        if self.kind == "edges":
-            return frame_image(_pictures(frames[-1:], times_us, self.quality, seed)[0], self.imager.settings)
+        if self.kind in FROM_FRAMES:
+            picture = _pictures(frames[-1:], times_us, self.quality, seed)[0]
+            return _halved(frame_image(picture, self.imager.settings))
         if self.kind == "film":
             pictures = _pictures(frames, times_us, self.quality, seed)
             light = [picture.astype(np.float32) / np.float32(255) for picture in pictures]
@@ -81,13 +83,19 @@ def _compressed(picture: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
     return np.asarray(Image.open(file))
 
 
+def _halved(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    rows, columns = (side // 2 for side in image.shape)
+    return np.rint(image.reshape(rows, 2, columns, 2).mean((1, 3))).astype(np.uint8)
+
+
 def draw_sensor(rng: np.random.Generator, size: Size, crop_bottom: float) -> Sensor:
-    """A sensor of `size` for one drive."""
-    kind = KINDS[int(rng.choice(len(KINDS), p=SHARES))]
+    """A sensor of `size` for one route."""
+    kind = list(SHARES)[int(rng.choice(len(SHARES), p=list(SHARES.values())))]
+    scale = 2 if kind in FROM_FRAMES else 1  # edges are found before an image is small
     images = ImageSettings(
         representation="count" if kind != "ideal" and rng.random() < 0.3 else "binary",
-        width=SIZE[0],
-        height=SIZE[1],
+        width=scale * SIZE[0],
+        height=scale * SIZE[1],
         blur=kind == "ideal" or bool(rng.random() < 0.6),
         crop_bottom=crop_bottom,
         saturation=int(rng.integers(2, 8)),

@@ -76,6 +76,7 @@ def train_descriptor(
         if learning.progress is not None:
             learning.progress(step + 1, settings.steps, float(loss.detach()))
         saved.keep(step + 1, network, optimiser)
+    saved.remove()
     network.eval()
     return network
 

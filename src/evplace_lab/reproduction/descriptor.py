@@ -17,7 +17,7 @@ from evplace.scorers.trained import FOLDER, DescriptorGraph
 from evplace_lab.descriptor.making import Recipe, judged, make_towns, train_seed
 from evplace_lab.reproduction import Choice, Table
 
-TITLE = "The learned descriptor: recall at 1 in % of single images of unseen places, other drives and sensors"
+TITLE = "The learned descriptor: recall at 1 in % of single images of unseen places"
 NEEDS = "nothing"
 INPUTS: tuple[str, ...] = ()
 METHODS: tuple[str, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -105,11 +106,13 @@ def test_a_stopped_training_ends_in_the_same_weights(
     kept = tmp_path / "training.safetensors"
     with pytest.raises(KeyboardInterrupt):
         train_descriptor(towns, FEW, Learning(stop, kept), "these")
+    other: list[int] = []
+    copied = shutil.copy(kept, tmp_path / "copied.safetensors")
+    train_descriptor(towns, FEW, Learning(lambda step, *_: other.append(step), copied), "those")
+    assert other[0] == 1
     steps: list[int] = []
     resumed = train_descriptor(towns, FEW, Learning(lambda step, *_: steps.append(step), kept), "these")
     assert steps == [3, 4]
     for name, value in as_arrays(resumed).items():
         np.testing.assert_array_equal(value, whole[name], name)
-    other: list[int] = []
-    train_descriptor(towns, FEW, Learning(lambda step, *_: other.append(step), kept), "those")
-    assert other[0] == 1
+    assert not kept.exists()
