@@ -23,7 +23,7 @@ class Describing(Protocol):
 
 
 def recalls(descriptor: Describing, bursts: Bursts) -> Iterator[float]:
-    """Recall at 1 in %, a number for each sensor and drive: a route's first drive is the map, the others look.
+    """Recall at 1 in %, a number for each sensor and drive: a route's first drive is the map.
 
     An image is the mean of two neighbours.
     """

@@ -85,7 +85,8 @@ def _compressed(picture: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
 
 def _halved(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     rows, columns = (side // 2 for side in image.shape)
-    return np.rint(image.reshape(rows, 2, columns, 2).mean((1, 3))).astype(np.uint8)
+    halved: NDArray[np.uint8] = np.rint(image.reshape(rows, 2, columns, 2).mean((1, 3))).astype(np.uint8)
+    return halved
 
 
 def draw_sensor(rng: np.random.Generator, size: Size, crop_bottom: float) -> Sensor:

@@ -10,13 +10,13 @@ import pytest
 
 pytest.importorskip("torch", reason="the network needs the extra 'train'")
 
-from evplace.cli import main  # noqa: E402
-from evplace.core.errors import SettingsError  # noqa: E402
-from evplace.scorers.trained import ABOUT, DescriptorGraph, Trained  # noqa: E402
-from evplace_lab.descriptor import making  # noqa: E402
-from evplace_lab.descriptor.bursts import BurstSettings  # noqa: E402
-from evplace_lab.descriptor.making import Recipe, town_file  # noqa: E402
-from evplace_lab.reproduction import Choice, descriptor, reproduce  # noqa: E402
+from evplace.cli import main
+from evplace.core.errors import SettingsError
+from evplace.scorers.trained import ABOUT, DescriptorGraph, Trained
+from evplace_lab.descriptor import making
+from evplace_lab.descriptor.bursts import BurstSettings
+from evplace_lab.descriptor.making import Recipe, town_file
+from evplace_lab.reproduction import Choice, descriptor, reproduce
 
 SMALL = Recipe(towns=1, bursts=BurstSettings(routes=1, drives=2, places=6), steps=2)
 ONE = Choice(seeds=1)
@@ -72,5 +72,5 @@ def test_the_table_names_the_weights(
 
 def test_unknown_settings_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.undo()
-    with pytest.raises(SettingsError, match="the descriptor's recipe: .*epochs"):
+    with pytest.raises(SettingsError, match=r"the descriptor's recipe: .*epochs"):
         reproduce("descriptor", tmp_path, choice=Choice(train={"epochs": 3}))
