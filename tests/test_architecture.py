@@ -28,7 +28,8 @@ ORDER = {
     "evplace.core": "errors events grey zscores settings families storage workers drawing",
     "evplace.sources": "frames readers writers cleaning tracks film simulators",
     "evplace.imaging": (
-        "windows _resampling representations tones images averaging recipe stream spacing traverse sheets"
+        "windows _resampling representations tones images activity averaging recipe stream spacing traverse "
+        "sheets"
     ),
     "evplace.drives": "datasets to_traverse",
     "evplace.scorers": "_search _reduction _compressed _distances _seqslam_images _network",

@@ -8,6 +8,7 @@ A file holds a frozen dataclass of the same name, which is a `Matcher`: `matcher
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
@@ -123,7 +124,8 @@ class Seen(NamedTuple):
     t_us: int
     """Time in microseconds."""
     content: float
-    """How much its image shows: mean grey value of an event image, mean change of a camera image."""
+    """How much its image shows: mean grey level of an event image, mean change of a camera image; NaN where
+    that is not known."""
 
 
 Learned = Mapping[str, NDArray[Any]]
@@ -139,6 +141,8 @@ class Route(NamedTuple):
     """(items,) clockwise from north, NaN where unknown."""
     t_us: NDArray[np.int64] | None = None
     """(items,) times of the map's drive in microseconds; None where they are not kept."""
+    content: float = math.nan
+    """What the map's images usually show, as in Seen."""
     learned: Learned | None = None
     """What `learn` has given for this map; None where it was not asked."""
 

@@ -7,19 +7,22 @@ second, and by how much it shows, since a camera that stands learns nothing new.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.matchers import Seen
+from evplace.matchers import Learned, Seen
 from evplace.matchers import _route_filter as loops
 from evplace.matchers import _surroundings as around
 from evplace.matchers._ways import APART_M, Ways
 
 Floats = NDArray[np.float64]
 
+WRONG, CONTENT = "wrong", "content"
+"""What a map has told: the density of wrong scores, and what its images show."""
 SPEEDS = np.array([0.25, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0])
 """Classes of speed, as shares of the map's own."""
 TICK_S = 0.1
@@ -28,6 +31,10 @@ MOVING_S = 0.8 * TICK_S
 """The filter moves once this much has been driven: never by steps much smaller than a reference."""
 REMEMBERED = 300
 """Images, at ten a second, by which it is judged whether the camera stands."""
+BELIEVED = 20
+"""For how many of them what the map's own images show is taken."""
+LONGEST_REST_S = 120.0
+"""A camera that shows little for longer is taken to show no more."""
 CHANGE = 0.1
 """Share of a class that becomes the next slower or faster one in a tick."""
 LINK = 0.02
@@ -119,7 +126,7 @@ def message_before(message: Floats, moment: Moment, ways: Ways) -> Floats:
 def reaches(ways: Ways) -> Floats:
     """(4,) metres for `loops.read`: wider where items lie far apart."""
     least = np.array([15.0, 4.0, 10.0, APART_M])
-    return np.maximum(least, np.array([2.0, 1.1, 1.5, 4.0]) * ways.spacing)
+    return np.asarray(np.maximum(least, np.array([2.0, 1.1, 1.5, 4.0]) * ways.spacing), np.float64)
 
 
 class Clock:
@@ -129,13 +136,15 @@ class Clock:
     showed something.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, usual: float = math.nan) -> None:
+        """`usual` is what the map's own images show, where it is known: a drive may begin with a stop."""
         self.standing = False
         """Whether the last image said nothing new."""
         self._last_us: int | None = None
         self._driven_s = 0.0
         self._since_kept_s = 0.0
-        self._shown: deque[float] = deque(maxlen=REMEMBERED)
+        self._rest_s = 0.0
+        self._shown: deque[float] = deque([] if math.isnan(usual) else [usual] * BELIEVED, maxlen=REMEMBERED)
 
     def see(self, seen: Seen) -> tuple[float, float | None]:
         """The weight of an image, 0 to 1, and the seconds driven where the filter is to move before it."""
@@ -151,11 +160,21 @@ class Clock:
         return new * active, driven
 
     def _active(self, content: float, seconds: float) -> float:
-        """From 0, standing, to 1."""
+        """From 0, standing, to 1, also where it is not known."""
+        if math.isnan(content):
+            return 1.0
         usual = float(np.median(self._shown)) if len(self._shown) >= 5 else content
         active = min(max((content / usual - 0.3) / 0.3, 0.0), 1.0) if usual > 0 else 1.0
         self._since_kept_s += seconds
+        self._rest_s = 0.0 if active else self._rest_s + seconds
+        if self._rest_s > LONGEST_REST_S:
+            self._shown.clear()
         if active > 0 and (self._since_kept_s >= MOVING_S or not self._shown):
             self._shown.append(content)
             self._since_kept_s = 0.0
         return active
+
+
+def clock_of(learned: Learned) -> Clock:
+    """A clock that knows what the map's images show, where that was learned."""
+    return Clock(float(learned[CONTENT][0])) if CONTENT in learned else Clock()

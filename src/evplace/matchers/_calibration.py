@@ -16,14 +16,15 @@ from evplace.matchers import Learned, Route, Rows, Seen
 from evplace.matchers import _surroundings as around
 from evplace.matchers import _traces as traces
 from evplace.matchers._answering import RIGHT_M
+from evplace.matchers._belief import CONTENT, WRONG
 from evplace.matchers._known import features, probability
 from evplace.matchers._ways import Ways
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-WRONG, LIVE, LATE = "wrong", "unknown_live", "unknown_late"
-"""Names of what is learned: the density of wrong scores; probabilities at places cut out, sorted."""
+LIVE, LATE = "unknown_live", "unknown_late"
+"""Probabilities, sorted, at places cut out: live, and when what comes later is known."""
 OTHER_M = 25.0
 """References further away than this show another place."""
 CUT_M = (60.0, 150.0)
@@ -47,8 +48,8 @@ def measured(route: Route, rows: Callable[[slice], Rows]) -> Learned:
     queries = min(items, MOST_IMAGES)
     own = np.array(rows(slice(0, queries)), np.float32)
     own[np.arange(queries), np.arange(queries)] = own.min(axis=1)  # an image tells nothing of itself
-    learned = {WRONG: _wrong(ways, own)}
-    unknown = [_trial(route, own, learned[WRONG], keep) for keep in _cuts(ways)]
+    learned = {WRONG: _wrong(ways, own), CONTENT: np.array([route.content])}
+    unknown = [_trial(route, own, learned, keep) for keep in _cuts(ways)]
     live, late = (np.sort(np.concatenate(column)) for column in zip(*unknown, strict=True))
     return learned if len(live) < LEAST_UNKNOWN else learned | {LIVE: live, LATE: late}
 
@@ -74,12 +75,12 @@ def _cuts(ways: Ways) -> Iterator[Bools]:
         yield (np.searchsorted(ends, ways.way, "right") + trial) % 2 == 0
 
 
-def _trial(route: Route, own: Rows, wrong: Floats, keep: Bools) -> tuple[Floats, Floats]:
+def _trial(route: Route, own: Rows, learned: Learned, keep: Bools) -> tuple[Floats, Floats]:
     """(unknown,) what is said, live and late, of those of a map's images whose places are cut out."""
     whole, part = Ways.of(route), Ways.of(_part(route, keep))
     seen, rows = _driven(whole, len(own)), own[:, keep]
     unknown = np.array([not _known(whole, keep, query) for query in range(len(own))])
-    live, late = traces.live(part, rows, seen, wrong), traces.late(part, rows, seen, wrong)
+    live, late = traces.live(part, rows, seen, learned), traces.late(part, rows, seen, learned)
     return (
         probability(features(live.signs, live.weight, late=False))[unknown],
         probability(features(late.signs, late.weight, late=True))[unknown],
@@ -100,4 +101,4 @@ def _known(whole: Ways, keep: Bools, query: int) -> bool:
 def _driven(ways: Ways, images: int) -> list[Seen]:
     """The map's own images as a drive at its usual pace."""
     t_us = np.concatenate([[0.0], np.cumsum(np.minimum(np.diff(ways.way[:images]) / ways.pace, 1.0))]) * 1e6
-    return [Seen(int(one), 1.0) for one in t_us]
+    return [Seen(int(one), np.nan) for one in t_us]

@@ -2,8 +2,8 @@
 
 Four signs of each answer are averaged over the images before it, and where the later ones are known, over
 these too: how like the reference is, how far it leads over other places, whether the single image agrees with
-the sequence, and how sure the filter is. Scores come as robust z-scores, which mean the same on any map and by
-any light; so one set of weights serves all. They are fitted on drives through other towns than the
+the sequence, and how sure the filter is. Scores come as robust z-scores, which mean the same on any map and
+by any light; so one set of weights serves all. They are fitted on drives through other towns than the
 benchmark's.
 """
 

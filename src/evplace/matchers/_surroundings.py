@@ -22,7 +22,7 @@ def density(z: Floats) -> Floats:
     ordered = np.sort(z)
     width = GRID[1] - GRID[0]
     counts = np.histogram(ordered, np.append(GRID - width / 2, GRID[-1] + width / 2))[0] / len(z) / width
-    kernel = np.exp(-0.5 * (np.arange(-12, 13) / 4.0) ** 2)
+    kernel: Floats = np.exp(-0.5 * (np.arange(-12, 13) / 4.0) ** 2)
     smooth = np.convolve(counts, kernel / kernel.sum(), "same")
     begin = ordered[int(len(ordered) * 0.995)]
     above = ordered[ordered > begin]
@@ -36,7 +36,8 @@ def _usual() -> Floats:
     """Of a map that was not measured: a normal density, with the tail that image comparison usually has."""
     normal = -0.5 * (GRID / 0.93) ** 2 - np.log(0.93 * np.sqrt(2 * np.pi))
     at = int(np.searchsorted(GRID, 2.4))
-    return np.where(GRID[at] > GRID, normal, normal[at] - 1.93 * (GRID - GRID[at]))
+    tail = normal[at] - 1.93 * (GRID - GRID[at])
+    return np.asarray(np.where(GRID[at] > GRID, normal, tail), np.float64)
 
 
 USUAL = _usual()

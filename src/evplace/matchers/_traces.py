@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.zscores import robust_z
-from evplace.matchers import Rows, Seen
+from evplace.matchers import Learned, Rows, Seen
 from evplace.matchers._answering import Reader
-from evplace.matchers._belief import Clock, Filter, Moment, smoothed
+from evplace.matchers._belief import WRONG, Clock, Filter, Moment, clock_of, smoothed
 from evplace.matchers._known import SIGNS
 from evplace.matchers._ways import Ways
 
@@ -23,8 +23,7 @@ BLOCK = 64
 class _Drive:
     """The weights of a drive's images and the moments that they fall into."""
 
-    def __init__(self, seen: Sequence[Seen]) -> None:
-        clock = Clock()
+    def __init__(self, seen: Sequence[Seen], clock: Clock) -> None:
         self.weight = np.zeros(len(seen))
         self.begins = [0]
         """The first image of each moment."""
@@ -49,9 +48,9 @@ class Trace(NamedTuple):
     """(queries,) how much each image counts."""
 
 
-def live(ways: Ways, rows: Rows, seen: Sequence[Seen], wrong: Floats | None) -> Trace:
-    """Each answer from the images up to it; `wrong` as Filter takes it."""
-    filter_, reader, clock = Filter(ways, wrong), Reader(ways), Clock()
+def live(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
+    """Each answer from the images up to it; `learned` is what the map has told."""
+    filter_, reader, clock = Filter(ways, learned.get(WRONG)), Reader(ways), clock_of(learned)
     out = Trace(np.zeros(len(rows), np.int64), np.zeros((len(rows), SIGNS)), np.zeros(len(rows)))
     for query, (row, one) in enumerate(zip(rows, seen, strict=True)):
         z = robust_z(row)
@@ -63,9 +62,9 @@ def live(ways: Ways, rows: Rows, seen: Sequence[Seen], wrong: Floats | None) -> 
     return out
 
 
-def late(ways: Ways, rows: Rows, seen: Sequence[Seen], wrong: Floats | None) -> Trace:
+def late(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
     """Each answer from all images of the drive."""
-    drive = _Drive(seen)
+    drive, wrong = _Drive(seen, clock_of(learned)), learned.get(WRONG)
     out = Trace(np.zeros(len(rows), np.int64), np.zeros((len(rows), SIGNS)), drive.weight)
     starts = _beliefs_at_blocks(ways, rows, drive, wrong)
     reader, message = Reader(ways), None

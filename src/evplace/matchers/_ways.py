@@ -63,14 +63,14 @@ class Ways:
     @classmethod
     def of(cls, route: Route) -> Ways:
         """Items without a position lie between those around them."""
-        known = np.isfinite(route.position).all(axis=1)
+        known = np.asarray(np.isfinite(route.position).all(axis=1), np.bool_)
         if known.sum() < 2:
             return cls._in_time(route)
         at = np.arange(len(known))
         xy = np.stack([np.interp(at, at[known], column[known]) for column in route.position.T], axis=1)
         steps = _lengths(np.diff(xy, axis=0))
         spacing = _usual(steps[steps > 0])
-        way = np.concatenate([[0.0], np.cumsum(np.where(_breaks(steps, spacing), GAP_M, steps))])
+        way: Floats = np.concatenate([[0.0], np.cumsum(np.where(_breaks(steps, spacing), GAP_M, steps))])
         links = _links(xy, route.heading_deg, way)
         return cls(way, _pace(route, steps), spacing, xy, route.heading_deg, links, in_metres=True)
 
@@ -80,7 +80,7 @@ class Ways:
         items = len(route.position)
         apart_s = 1.0 if route.t_us is None else _usual(np.diff(route.t_us) * 1e-6)
         step = min(USUAL_SPEED * apart_s, LARGEST_STEP_M)
-        way: Floats = np.arange(items) * step
+        way = np.arange(items, dtype=np.float64) * step
         xy = np.stack([way, np.zeros(items)], axis=1)
         links = Links(np.zeros(items + 1, np.int64), np.zeros(0, np.int64))
         unknown = np.full(items, np.nan)

@@ -2,8 +2,8 @@
 
 Two layers. The first says where the camera is, if it is on the map: a filter over the references, each with
 a class of speed (Markov localisation: Fox, Burgard and Thrun, JAIR 11, 1999). The second says whether that
-answer is right, from what the answers of the last second looked like (ours). What separates known from unknown
-is measured on the map alone: its own images are localised while stretches of the map are cut out, and
+answer is right, from what the answers of the last second looked like (ours). What separates known from
+unknown is measured on the map alone: its own images are localised while stretches of the map are cut out;
 `false_accept` is the share of those never seen that may be accepted.
 
 Answers are live; with `lag_s` each is about the time so many seconds ago, and better; in hindsight all images
@@ -13,7 +13,7 @@ count. Times are in seconds and ways in metres, so that images of any rate give 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -37,8 +37,8 @@ from evplace.matchers import (
     Sweep,
 )
 from evplace.matchers._answering import Found, Reader
-from evplace.matchers._belief import Clock, Filter, Moment, smoothed
-from evplace.matchers._calibration import LATE, LIVE, WRONG, measured
+from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
+from evplace.matchers._calibration import LATE, LIVE, measured
 from evplace.matchers._known import LATER, SPANS, Means, features, means_ahead, probability
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
@@ -63,6 +63,7 @@ class Bayes:
     lag_s: float = 0.0
     """Seconds that an answer waits for what comes next: 0, or from 1 to 60."""
 
+    presets: ClassVar[Mapping[str, Bayes]]
     causal: ClassVar[bool] = False
     probabilistic: ClassVar[bool] = True
 
@@ -82,7 +83,7 @@ class Bayes:
 
     def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
         """See RouteMatcher."""
-        trace = late(Ways.of(route), rows, seen, (route.learned or {}).get(WRONG))
+        trace = late(Ways.of(route), rows, seen, route.learned or {})
         right = probability(features(trace.signs, trace.weight, late=True))
         return Path(trace.item, right, right > self._threshold(route, LATE))
 
@@ -103,6 +104,9 @@ class Bayes:
         return -1.0 if unknown is None else float(np.quantile(unknown, 1 - self.false_accept))
 
 
+Bayes.presets = {"best": Bayes()}
+
+
 class _Live:
     """Answers each image at once, from those before it."""
 
@@ -111,7 +115,7 @@ class _Live:
         self._threshold, self._measured = settings._threshold(route, LIVE), LIVE in learned
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
         self._reader = Reader(self._filter.ways)
-        self._clock, self._check, self._means = Clock(), RowCheck(), Means()
+        self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
 
     def step(self, row: Row, seen: Seen) -> list[Answer]:
         """See Following."""
@@ -148,7 +152,7 @@ class _Lagging:
         self._lag_us = round(settings.lag_s * 1e6)
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
         self._reader = Reader(self._filter.ways)
-        self._clock, self._check, self._means = Clock(), RowCheck(), Means()
+        self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
         self._waiting: deque[_Seen] = deque()
         self._moments: deque[Moment] = deque()
         self._moved = 0

@@ -23,15 +23,14 @@ class Compressed(NamedTuple):
 
     def rows(self, vectors: Vectors) -> Vectors:
         """(n, dimensions) -> (n, items) products, as those of the whole vectors but for what was left out."""
-        rows: Vectors = (vectors @ self.basis) @ self.vectors.T
-        return rows
+        return np.asarray((vectors @ self.basis) @ self.vectors.T, np.float32)
 
 
 def compress(references: Vectors, components: int) -> Compressed:
-    """References (items, dimensions) by their principal components, not centred; exact where these suffice."""
+    """References (items, dimensions) by their principal components; exact where these suffice."""
     sample = references[:: -(-len(references) // MOST_SAMPLED)].astype(np.float64)
     values, directions = np.linalg.eigh(sample @ sample.T)
     kept = np.flatnonzero(values > 1e-9 * max(float(values[-1]), 1e-30))[::-1][:components]
-    basis = (sample.T @ directions[:, kept]) / np.sqrt(values[kept])
-    basis = basis.astype(np.float32)
-    return Compressed(basis, references @ basis)
+    scaled = directions[:, kept] / np.sqrt(values[kept])
+    basis = np.asarray(sample.T @ scaled, np.float32)
+    return Compressed(basis, np.asarray(references @ basis, np.float32))
