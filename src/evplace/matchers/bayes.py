@@ -40,7 +40,7 @@ from evplace.matchers import (
 from evplace.matchers._answering import Found, Reader
 from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
 from evplace.matchers._calibration import LATE, LIVE, measured
-from evplace.matchers._known import LATER, SPANS, Means, features, means_ahead, probability
+from evplace.matchers._known import Means, features, means_ahead, of_drive, probability
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
 from evplace.matchers._ways import Ways
@@ -85,7 +85,7 @@ class Bayes:
     def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
         """See RouteMatcher."""
         trace = late(Ways.of(route), rows, seen, route.learned or {})
-        right = probability(features(trace.signs, trace.weight, late=True))
+        right = probability(of_drive(trace.signs, trace.weight, late=True))
         return Path(trace.item, right, right > self._threshold(route, LATE))
 
     def start(self, distances: bool = False) -> Matching:  # noqa: ARG002
@@ -126,7 +126,7 @@ class _Live:
             self._filter.move(drive_s)
         belief = self._filter.see(z, weight)
         found = self._reader.find(belief, z)
-        right = float(probability(self._means.add(found.signs, weight).reshape(-1)))
+        right = float(probability(features(self._means.add(found.signs, weight))))
         return [_answer(self, self._check.queries - 1, belief, found, right, self._clock.standing)]
 
     def finish(self) -> list[Answer]:
@@ -185,12 +185,12 @@ class _Lagging:
         beliefs, _ = smoothed(moments, self._filter.ways)
         found = [self._reader.find(beliefs[one.moment - first], one.z) for one in self._waiting]
         weights = np.array([one.weight for one in self._waiting])
-        ahead = means_ahead(np.array([one.signs for one in found]), weights, SPANS[list(LATER)])
+        ahead = means_ahead(np.array([one.signs for one in found]), weights)
         answers = []
         for at in range(due):
             one = self._waiting.popleft()
-            means = np.concatenate([self._means.add(found[at].signs, one.weight), ahead[at]], axis=1)
-            right = float(probability(means.reshape(-1)))
+            before = self._means.add(found[at].signs, one.weight)
+            right = float(probability(features(before, ahead[at])))
             belief = beliefs[one.moment - first]
             answers.append(_answer(self, one.query, belief, found[at], right, one.standing))
         while self._waiting and self._waiting[0].moment > self._moved - len(self._moments):
