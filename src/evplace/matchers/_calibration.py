@@ -7,10 +7,12 @@ what the two layers then say of images from there is what they will say of place
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.errors import PlaceMapError
 from evplace.core.zscores import robust_z
 from evplace.matchers import Learned, Route, Rows, Seen
 from evplace.matchers import _surroundings as around
@@ -104,3 +106,29 @@ def _driven(ways: Ways, images: int) -> list[Seen]:
     """The map's own images as a drive at its usual pace."""
     t_us = np.concatenate([[0.0], np.cumsum(np.minimum(np.diff(ways.way[:images]) / ways.pace, 1.0))]) * 1e6
     return [Seen(int(one), np.nan) for one in t_us]
+
+
+def checked(learned: Learned | None) -> Learned:
+    """What was learned of a map, or nothing; PlaceMapError where it is not such."""
+    if not learned:
+        return {}
+    wrong, content = (np.asarray(learned.get(name)) for name in (WRONG, CONTENT))
+    good = wrong.shape == around.GRID.shape and _are_finite(wrong) and content.shape == (1,)
+    good = good and content.dtype == np.float64 and not (content < 0).any()
+    if not good or not all(_are_shares(np.asarray(learned.get(name))) for name in (LIVE, LATE)):
+        raise PlaceMapError(
+            "what the map has told of itself is damaged or missing in part: measure it again, with "
+            "evplace calibrate"
+        )
+    return learned
+
+
+def _are_shares(values: NDArray[Any]) -> bool:
+    """Whether they are sorted, from 0 to 1."""
+    if values.ndim != 1 or not len(values) or not _are_finite(values):
+        return False
+    return bool((np.diff(values) >= 0).all() and values[0] >= 0 and values[-1] <= 1)
+
+
+def _are_finite(values: NDArray[Any]) -> bool:
+    return values.dtype == np.float64 and bool(np.isfinite(values).all())

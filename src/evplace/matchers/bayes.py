@@ -39,7 +39,7 @@ from evplace.matchers import (
 )
 from evplace.matchers._answering import Found, Reader
 from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
-from evplace.matchers._calibration import LATE, LIVE, measured
+from evplace.matchers._calibration import LATE, LIVE, checked, measured
 from evplace.matchers._known import Means, features, means_ahead, of_drive, probability
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
@@ -49,6 +49,8 @@ Floats = NDArray[np.float64]
 
 UNDECIDED = 0.1
 """Below this share of the threshold an answer is no longer lost, but of a place never seen."""
+LEAST = 0.1
+"""An answer less probable than this is accepted by no calibration."""
 ALIKE = 0.5
 """A runner-up with so large a share of the best one's belief makes an answer ambiguous."""
 
@@ -84,7 +86,7 @@ class Bayes:
 
     def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
         """See RouteMatcher."""
-        trace = late(Ways.of(route), rows, seen, route.learned or {})
+        trace = late(Ways.of(route), rows, seen, checked(route.learned))
         right = probability(of_drive(trace.signs, trace.weight, late=True))
         return Path(trace.item, right, right > self._threshold(route, LATE))
 
@@ -102,7 +104,7 @@ class Bayes:
         if self.threshold is not None:
             return self.threshold
         unknown = (route.learned or {}).get(kind)
-        return -1.0 if unknown is None else float(np.quantile(unknown, 1 - self.false_accept))
+        return -1.0 if unknown is None else max(float(np.quantile(unknown, 1 - self.false_accept)), LEAST)
 
 
 Bayes.presets = {"best": Bayes()}
@@ -112,7 +114,7 @@ class _Live:
     """Answers each image at once, from those before it."""
 
     def __init__(self, settings: Bayes, route: Route) -> None:
-        learned = route.learned or {}
+        learned = checked(route.learned)
         self._threshold, self._measured = settings._threshold(route, LIVE), LIVE in learned
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
         self._reader = Reader(self._filter.ways)
@@ -148,7 +150,7 @@ class _Lagging:
     """Answers each image `lag_s` later, when what came next is known, too."""
 
     def __init__(self, settings: Bayes, route: Route) -> None:
-        learned = route.learned or {}
+        learned = checked(route.learned)
         self._threshold, self._measured = settings._threshold(route, LATE), LATE in learned
         self._lag_us = round(settings.lag_s * 1e6)
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
