@@ -23,7 +23,8 @@ METHODS = tuple(methods())
 FORMAT = "evplace-table-1"
 KEPT_INPUTS = ("events", "events, from 8 bit", "colour")
 KEPT_METHODS = (
-    "global-max", "Algorithm 1", "SeqSLAM, all accepted", "graph, alpha 0.1", "blurred correlation, sequence"
+    "best", "global-max", "Algorithm 1", "SeqSLAM, all accepted", "graph, alpha 0.1",
+    "blurred correlation, sequence",
 )  # fmt: skip
 """Of these the whole result is kept, with the first seed."""
 MAIN_INPUTS = ("events", "events, from 8 bit", "events, weak sensor", "colour")
