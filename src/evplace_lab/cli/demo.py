@@ -200,8 +200,8 @@ def _sentence(rows: list[dict[str, object]]) -> str:
     if not called:
         return found
     return (
-        f"{found} On the other path, {_percent(sum(called) / len(called))} % of the images of streets that the "
-        "map has never seen were called just that."
+        f"{found} On the other path, {_percent(sum(called) / len(called))} % of the images of streets that "
+        "the map has never seen were called just that."
     )
 
 

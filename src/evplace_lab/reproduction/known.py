@@ -96,13 +96,17 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
     columns = ["town", "sensor", "query", "live", "false accepts", "late", "false accepts"]
     lines = [
         [str(row["town"]), row["sensor"], row["query"],
-         *(f"{row[kind][name]:.1f}" for kind in ("live", "late") for name in ("accuracy", "false_accepts"))]
+         *(_shown(row[kind][name]) for kind in ("live", "late") for name in ("accuracy", "false_accepts"))]
         for row in document["rows"]
     ]  # fmt: skip
     yield Table(document["title"], columns, lines)
     weights = document["weights"]
     lines = [[kind, " ".join(f"{weight:.4f}" for weight in weights[kind])] for kind in weights]
     yield Table("For evplace/matchers/_known_weights.py", ["answers", "weights"], lines)
+
+
+def _shown(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
 
 
 def _drives(folder: Path, town: CitySettings, sensor: str) -> Iterator[Drive]:
@@ -194,6 +198,6 @@ def _judged(drives: list[Drive], town: int) -> Iterator[dict[str, Any]]:
             unknown = accepted[~known]
             row[kind] = {
                 "accuracy": 100 * float(good.mean()),
-                "false_accepts": 100 * float(unknown.mean()) if len(unknown) else float("nan"),
+                "false_accepts": 100 * float(unknown.mean()) if len(unknown) else None,
             }
         yield row
