@@ -8,6 +8,7 @@ hindsight knows is asked for by name.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
@@ -48,7 +49,16 @@ class Match:
     score: float
     """The matcher's confidence, larger is better; NaN where it has none."""
     state: State
-    """localised; unseen: the map has never been here; no-events: the window was empty."""
+    """What it is worth."""
+    probability: float = math.nan
+    """That the camera is near the item and looks the same way; NaN where the matcher does not say it."""
+    uncertainty_m: float = math.nan
+    """Radius around the position that holds the camera with a probability of 68 %, if it is on the map; NaN
+    where the matcher does not say it."""
+    heading_deg: float | None = None
+    """Where the item looks, clockwise from north; None where unknown."""
+    others: tuple[int, ...] = ()
+    """The next best items, at other places, best first, where the matcher says them."""
 
 
 class Answered(NamedTuple):
@@ -100,6 +110,8 @@ class Localizer:
         with families.blaming("matchers", self.matcher):
             self._matching: Matching = self.matcher.start(self._distances)
         self._stepped = 0
+        self.image: NDArray[np.uint8] | None = None
+        """The last image that was matched."""
         self._images: EventImages | None = None
         self._times_us: list[int] = []
 
@@ -110,6 +122,24 @@ class Localizer:
         for image in self._images.push(events):
             yield from self._matches_of(image)
 
+    def tick(self, t_us: int) -> Iterator[Match]:
+        """The matches of all windows that are over once no event up to `t_us` will come any more.
+
+        A camera at rest sends nothing: its windows are closed by time. Where events do come later than that,
+        they belong to the window that is open then.
+        """
+        if self._images is not None:
+            for image in self._images.tick(t_us):
+                yield from self._matches_of(image)
+
+    def new_clock(self) -> Iterator[Match]:
+        """The match of the open window; times start anew with the next event, on the same drive.
+
+        For a camera that was started again: what the matcher knows of the drive is kept.
+        """
+        yield from self.finish()
+        self._images = None
+
     def finish(self) -> Iterator[Match]:
         """The match of the last window, when the drive is over."""
         if self._images is not None:
@@ -118,6 +148,7 @@ class Localizer:
 
     def push_image(self, image: NDArray[np.uint8], t_us: int) -> Iterator[Match]:
         """The matches that become known with one more image (h, w) or (h, w, C)."""
+        self.image = image
         self._times_us.append(t_us)
         answer = self._step(self.rows(image[None])[0])
         if answer is not None:
