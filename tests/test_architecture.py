@@ -32,7 +32,7 @@ ORDER = {
         "windows _resampling representations tones images recipe stream spacing traverse sheets"
     ),
     "evplace.drives": "datasets to_traverse",
-    "evplace.scorers": "_search _distances _seqslam_images _network",
+    "evplace.scorers": "_search _distances _reduction _seqslam_images _network",
     "evplace.scorers._network": "network network_onnx augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
     "evplace_lab": "city reproduction report cli",

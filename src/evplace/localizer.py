@@ -23,7 +23,8 @@ from evplace.core.settings import to_dict
 from evplace.imaging.recipe import shown
 from evplace.imaging.stream import EventImage, EventImages
 from evplace.imaging.traverse import Traverse
-from evplace.matchers import Answer, Matcher, Matching, Path, stepped
+from evplace.matchers import Answer, Estimate, Matcher, Matching, Path, stepped
+from evplace.matchers import State as StateOfAnswer
 from evplace.matchers._checks import check_answer, check_path
 from evplace.placemap import PlaceMap
 from evplace.scorers import OpenScorer, Rows, scorer_of
@@ -31,7 +32,8 @@ from evplace.sources.cleaning import MaskSource, read_mask
 
 Answers = Literal["live", "hindsight"]
 """What the camera would have been told as it drove; or what is known once the drive is over."""
-State = Literal["localised", "unseen", "no-events"]
+State = StateOfAnswer | Literal["no-events"]
+"""What a match is worth: see `evplace.matchers.State`; no-events: the window was empty."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,12 +234,18 @@ class Localizer:
 
     def _match(self, t_us: int, answer: Answer) -> Match:
         """An answer of the matcher, with what the map knows of its item."""
-        state: State = "localised" if answer.accepted else "unseen"
+        state: StateOfAnswer = "localised" if answer.accepted else "unseen"
         if answer.item < 0:
             return Match(t_us, -1, -1, None, answer.score, "unseen")
-        easting, northing = self.map.items.position[answer.item]
-        position = None if np.isnan(easting) else (float(easting), float(northing))
-        return Match(t_us, answer.item, int(self.map.items.place[answer.item]), position, answer.score, state)
+        items, more = self.map.items, answer.estimate or Estimate(state, math.nan, math.nan, ())
+        easting, northing = items.position[answer.item]
+        heading = float(items.heading_deg[answer.item])
+        return Match(
+            t_us, answer.item, int(items.place[answer.item]),
+            None if np.isnan(easting) else (float(easting), float(northing)),
+            answer.score, more.state, more.probability, more.uncertainty_m,
+            None if np.isnan(heading) else heading, more.others,
+        )  # fmt: skip
 
     def _open_images(self, events: Events) -> EventImages:
         recipe = self.map.recipe

@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
 from evplace.scorers import Rows, scorer_of
+from evplace.scorers._reduction import reduction
 from evplace.scorers._seqslam_images import prepare
 from evplace.scorers.cosine import Cosine
-from evplace.scorers.ncc import NCC, _reduction
+from evplace.scorers.ncc import NCC
 from evplace.scorers.sad import SAD
 from evplace.scorers.seqslam import SeqSLAM
 
@@ -55,7 +56,7 @@ def test_ncc_of_an_image_without_contrast_is_nothing() -> None:
 
 def test_the_reduction_keeps_means() -> None:
     for n_in, n_out, sigma in [(90, 22, 2.0), (7, 7, 2.0), (5, 5, 0.0), (160, 40, 50.0)]:
-        matrix = _reduction(n_in, n_out, sigma)
+        matrix = reduction(n_in, n_out, sigma)
         assert matrix.shape == (n_out, n_in)
         np.testing.assert_allclose(matrix.sum(axis=1), 1, atol=1e-6)
 

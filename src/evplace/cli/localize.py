@@ -13,6 +13,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import json
+import math
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -35,7 +36,10 @@ from evplace.sources.film import Film
 from evplace.sources.readers import Recording
 from evplace.sources.simulators.recording import SimulatedRecording
 
-COLUMNS = ("t_us", "place", "easting", "northing", "score", "state")
+COLUMNS = (
+    "t_us", "place", "easting", "northing", "score", "state", "latitude", "longitude", "heading_deg",
+    "probability", "uncertainty_m",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -113,31 +117,38 @@ def run(args: Args) -> int:
         ):
             writer = csv.writer(file)
             writer.writerow(COLUMNS)
-            writer.writerows(_row(match) for match in matches)
+            writer.writerows(_row(match, where.map) for match in matches)
     elif args.json:
         for match in matches:
-            print(json.dumps(_object(match)))
+            print(json.dumps(_object(match, where.map)))
     else:
         writer = csv.writer(sys.stdout, lineterminator="\n")
         writer.writerow(COLUMNS)
         for match in matches:
-            writer.writerow(_row(match))
+            writer.writerow(_row(match, where.map))
     if matches.fault is not None:
         note(f"{matches.fault}; the good part was localised")
     return USED_GOOD_PART if matches.fault is not None else 0
 
 
-def _row(match: Match) -> list[object]:
-    easting, northing = match.position or ("", "")
-    score = "" if match.score != match.score else f"{match.score:.6g}"
-    return [match.t_us, match.place, _metres(easting), _metres(northing), score, match.state]
+def _row(match: Match, place_map: PlaceMap) -> list[object]:
+    easting, northing = match.position or (math.nan, math.nan)
+    latitude, longitude = (match.position and place_map.geodetic(match.position)) or (math.nan, math.nan)
+    heading = math.nan if match.heading_deg is None else match.heading_deg
+    return [
+        match.t_us, match.place, _shown(easting, ".2f"), _shown(northing, ".2f"), _shown(match.score, ".6g"),
+        match.state, _shown(latitude, ".7f"), _shown(longitude, ".7f"), _shown(heading, ".1f"),
+        _shown(match.probability, ".4f"), _shown(match.uncertainty_m, ".1f"),
+    ]  # fmt: skip
 
 
-def _metres(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.2f}"
+def _shown(value: float, form: str) -> str:
+    return "" if math.isnan(value) else f"{value:{form}}"
 
 
-def _object(match: Match) -> dict[str, object]:
+def _object(match: Match, place_map: PlaceMap) -> dict[str, object]:
     values = dataclasses.asdict(match)
-    values["score"] = None if match.score != match.score else match.score
-    return values
+    for name in ("score", "probability", "uncertainty_m"):
+        values[name] = None if math.isnan(values[name]) else values[name]
+    latitude, longitude = (match.position and place_map.geodetic(match.position)) or (None, None)
+    return values | {"latitude": latitude, "longitude": longitude}

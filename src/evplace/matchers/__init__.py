@@ -8,8 +8,8 @@ A file holds a frozen dataclass of the same name, which is a `Matcher`: `matcher
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,25 @@ Judge = Callable[[NDArray[np.float64], float], NDArray[np.bool_]]
 """(queries,) scores and a value of a parameter -> (queries,) accepted."""
 
 
+State = Literal["localised", "ambiguous", "unseen", "lost", "standing"]
+"""localised; ambiguous: two places are alike; unseen: the map has never been here; lost: for a while nothing
+has been found; standing: the camera stands, at the place found last."""
+
+
+class Estimate(NamedTuple):
+    """What a matcher that knows the route can say of its answer."""
+
+    state: State
+    """What the answer is worth."""
+    probability: float
+    """That the camera is near the item and looks the same way."""
+    uncertainty_m: float
+    """Radius around the item that holds the camera with a probability of 68 %, if it is on the map; NaN where
+    items have no positions."""
+    others: tuple[int, ...]
+    """The next best items, at other places, best first."""
+
+
 class Answer(NamedTuple):
     """What a matcher says of one query."""
 
@@ -38,6 +57,8 @@ class Answer(NamedTuple):
     """The matcher's own confidence, larger is better; NaN where it has none."""
     accepted: bool
     """Whether the matcher stands by `item`; False means: not seen before."""
+    estimate: Estimate | None = None
+    """More, from a matcher that knows the route."""
 
 
 class Path(NamedTuple):
@@ -96,6 +117,59 @@ class Matcher(Protocol):
         """How a precision-recall curve over a parameter is drawn; None: over the usual one."""
 
 
+class Seen(NamedTuple):
+    """What is known of a query besides its score row."""
+
+    t_us: int
+    """Time in microseconds."""
+    content: float
+    """How much its image shows: mean grey value of an event image, mean change of a camera image."""
+
+
+Learned = Mapping[str, NDArray[Any]]
+"""What a matcher has learned of a map: arrays by their names."""
+
+
+class Route(NamedTuple):
+    """What a map tells a matcher of its items, in the order in which its drive met them."""
+
+    position: NDArray[np.float64]
+    """(items, 2) metres east and north, NaN where unknown."""
+    heading_deg: NDArray[np.float64]
+    """(items,) clockwise from north, NaN where unknown."""
+    t_us: NDArray[np.int64] | None = None
+    """(items,) times of the map's drive in microseconds; None where they are not kept."""
+    learned: Learned | None = None
+    """What `learn` has given for this map; None where it was not asked."""
+
+
+class Following(Protocol):
+    """One traverse being matched by a matcher that knows the route; see Matching."""
+
+    def step(self, row: Row, seen: Seen) -> Answer | None:
+        """Take the next query; say what is known by now."""
+
+    def finish(self) -> list[Answer]:
+        """The drive is over: the answers that were still to come."""
+
+    def extend(self, rows: Rows, seen: Sequence[Seen]) -> None:
+        """Take many queries at once."""
+
+    def path(self) -> Path:
+        """The answers for all queries so far, in hindsight."""
+
+
+@runtime_checkable
+class RouteMatcher(Protocol):
+    """A Matcher that also uses where a map's items are, and when and how much a query saw."""
+
+    def learn(self, route: Route, rows: Callable[[slice], Rows]) -> Learned:
+        """What the map's own images tell; `rows` gives the score rows of some of its items' own images."""
+
+    def follow(self, route: Route, distances: bool = False) -> Following:
+        """Begin a traverse."""
+
+
 class Sweep(NamedTuple):
     """One parameter of a matcher over many values."""
 
@@ -138,8 +212,8 @@ def open_matcher(
 from evplace.matchers._rows import Answers, RowCheck  # noqa: E402 - they are made of what stands above
 
 __all__ = [
-    "Answer", "Answers", "Judge", "Matcher", "Matching", "Path", "Row", "RowCheck", "Rows", "Sweep",
-    "open_matcher", "stepped",
+    "Answer", "Answers", "Estimate", "Following", "Judge", "Learned", "Matcher", "Matching", "Path", "Route",
+    "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep", "open_matcher", "stepped",
 ]  # fmt: skip
 
 

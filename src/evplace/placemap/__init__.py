@@ -137,6 +137,18 @@ class PlaceMap:
             path, track, recipe, time_unit, None, mask, drive, dataset, stream, columns, **settings
         )
 
+    def geodetic(self, position: tuple[float, float]) -> tuple[float, float] | None:
+        """Latitude and longitude in degrees (WGS 84) of a position in this map's metres.
+
+        None on a local plane.
+        """
+        if self.zone is None or not self.zone[0]:
+            return None
+        import utm
+
+        latitude, longitude = utm.to_latlon(*position, self.zone[0], northern=self.zone[1], strict=False)
+        return float(latitude), float(longitude)
+
     def require_same(self, query: Traverse) -> None:
         """PlaceMapError where a query's images were not made as this map's: they cannot be compared."""
         if self.recipe is not None and query.recipe is not None:

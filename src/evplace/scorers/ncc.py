@@ -5,13 +5,13 @@ Event images have their edges a pixel or two elsewhere at each pass; the blur fo
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
+from evplace.scorers._reduction import reduction
 
 FLAT = 1e-3
 """Below this length, in grey levels, what is left of an image is rounding."""
@@ -37,8 +37,8 @@ class NCC:
     def describe(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
         """(n, pixels): blurred, reduced, of mean 0 and length 1; an image without contrast becomes 0."""
         height, width = images.shape[1:3]
-        rows = _reduction(height, min(height, self.height), self.sigma)
-        columns = _reduction(width, min(width, self.width), self.sigma)
+        rows = reduction(height, min(height, self.height), self.sigma)
+        columns = reduction(width, min(width, self.width), self.sigma)
         values = images.astype(np.float32)
         if self.log:
             values = np.log1p(values)
@@ -48,29 +48,3 @@ class NCC:
         length = np.linalg.norm(flat, axis=1, keepdims=True)
         unit: NDArray[np.float32] = np.divide(flat, length, out=np.zeros_like(flat), where=length > FLAT)
         return unit
-
-
-@functools.cache
-def _reduction(n_in: int, n_out: int, sigma: float) -> NDArray[np.float32]:
-    """(out, in): a Gaussian blur with mirrored borders, then the mean over each output's share."""
-    edges = np.arange(n_out + 1) * n_in / n_out
-    inputs = np.arange(n_in)
-    overlap = np.minimum(edges[1:, None], inputs + 1) - np.maximum(edges[:-1, None], inputs)
-    share = np.maximum(overlap, 0) * n_out / n_in
-    return np.asarray(share @ _blur(n_in, sigma), np.float32)
-
-
-def _blur(n: int, sigma: float) -> NDArray[np.float64]:
-    """(n, n): row i holds the weights of the Gaussian around i; cut at 4 sigma."""
-    if sigma == 0 or n == 1:
-        return np.eye(n)
-    reach = int(min(4 * sigma + 0.5, n - 1))
-    shifts = np.arange(-reach, reach + 1)
-    kernel = np.exp(-0.5 * (shifts / sigma) ** 2)
-    kernel /= kernel.sum()
-    matrix = np.zeros((n, n))
-    for shift, weight in zip(shifts, kernel, strict=True):
-        source = np.abs(np.arange(n) + shift)
-        source = np.where(source >= n, 2 * (n - 1) - source, source)
-        matrix[np.arange(n), source] += weight
-    return matrix

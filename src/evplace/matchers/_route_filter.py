@@ -1,0 +1,107 @@
+"""The loops of a Bayes filter over the references of a route, each with a class of speed.
+
+A belief (references, speeds) sums to 1. Between two images each class moves on by its way; a class may change
+to the next slower or faster one; a share passes to references that lie beside (a crossing, a loop, another
+drive); and a small share may be anywhere.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Belief = NDArray[np.float64]
+"""(references, speeds)."""
+Floats = NDArray[np.float64]
+
+
+class Links(NamedTuple):
+    """References that may be passed to without driving there, as lists one behind the other."""
+
+    first: NDArray[np.int64]
+    """(references + 1,) where each reference's list begins."""
+    to: NDArray[np.int64]
+    """The references linked to."""
+
+
+@njit(cache=True, nogil=True)
+def mix_speeds(belief: Belief, change: float, out: Belief) -> None:
+    """Part of each class goes to its neighbours; its own transpose."""
+    last = belief.shape[1] - 1
+    for r in range(belief.shape[0]):
+        for v in range(last + 1):
+            slower = belief[r, max(v - 1, 0)]
+            faster = belief[r, min(v + 1, last)]
+            out[r, v] = (1 - change) * belief[r, v] + 0.5 * change * (slower + faster)
+
+
+@njit(cache=True, nogil=True)
+def move(belief: Belief, way: Floats, steps: Floats, out: Belief) -> None:
+    """Each class v moves on by steps[v] along the way (references,); what passes the end is lost.
+
+    Between two references it is shared by nearness.
+    """
+    n = len(way)
+    out[:] = 0.0
+    for v in range(len(steps)):
+        at = 0
+        for r in range(n):
+            goal = way[r] + steps[v]
+            while at < n - 1 and way[at + 1] <= goal:
+                at += 1
+            if at == n - 1:
+                if goal <= way[at]:
+                    out[at, v] += belief[r, v]
+                continue
+            share = (goal - way[at]) / (way[at + 1] - way[at])
+            out[at, v] += (1 - share) * belief[r, v]
+            out[at + 1, v] += share * belief[r, v]
+
+
+@njit(cache=True, nogil=True)
+def move_back(later: Belief, way: Floats, steps: Floats, out: Belief) -> None:
+    """The transpose of `move`."""
+    n = len(way)
+    for v in range(len(steps)):
+        at = 0
+        for r in range(n):
+            goal = way[r] + steps[v]
+            while at < n - 1 and way[at + 1] <= goal:
+                at += 1
+            if at == n - 1:
+                out[r, v] = later[at, v] if goal <= way[at] else 0.0
+                continue
+            share = (goal - way[at]) / (way[at + 1] - way[at])
+            out[r, v] = (1 - share) * later[at, v] + share * later[at + 1, v]
+
+
+@njit(cache=True, nogil=True)
+def pass_links(
+    belief: Belief, first: NDArray[np.int64], to: NDArray[np.int64], share: float, out: Belief
+) -> None:
+    """A share of each linked reference's belief goes to its links, equally."""
+    out[:] = belief
+    for r in range(belief.shape[0]):
+        many = first[r + 1] - first[r]
+        for k in range(first[r], first[r + 1]):
+            for v in range(belief.shape[1]):
+                part = share * belief[r, v] / many
+                out[r, v] -= part
+                out[to[k], v] += part
+
+
+@njit(cache=True, nogil=True)
+def pass_links_back(
+    later: Belief, first: NDArray[np.int64], to: NDArray[np.int64], share: float, out: Belief
+) -> None:
+    """The transpose of `pass_links`."""
+    for r in range(later.shape[0]):
+        many = first[r + 1] - first[r]
+        for v in range(later.shape[1]):
+            there = 0.0
+            for k in range(first[r], first[r + 1]):
+                there += later[to[k], v] / many
+            out[r, v] = later[r, v] if many == 0 else (1 - share) * later[r, v] + share * there

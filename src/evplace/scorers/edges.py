@@ -1,0 +1,103 @@
+"""What the edges of an image look like, without training: made for places that look otherwise by night.
+
+An image is described twice: by its values against their own surroundings (local contrast), and by the
+directions of its edges in small cells (histograms of oriented gradients, Dalal and Triggs 2005). Both forget
+how strong the light was, which is what differs between day and night. It needs numpy alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core.errors import SettingsError
+from evplace.scorers._reduction import blurred, grey, reduced, reduction, unit
+
+Values = NDArray[np.float32]
+"""(n, h, w)."""
+FLAT = 1e-6
+"""Below this length what is left of an image is rounding."""
+SURROUNDINGS = 10.0
+"""Standard deviation in reduced pixels of what a pixel is compared with."""
+
+
+@dataclass(frozen=True)
+class Edges:
+    """How images are described; scores go from -1 to 1."""
+
+    width: int = 80
+    """Columns that an image is reduced to; smaller ones stay as they are (ours)."""
+    height: int = 45
+    """Rows that it is reduced to (ours)."""
+    orientations: int = 6
+    """Directions of an edge that are told apart (ours)."""
+    cell: int = 4
+    """Side in pixels of the cells whose edges are counted together (ours)."""
+
+    def __post_init__(self) -> None:
+        if min(self.width, self.height, self.cell) < 1 or self.orientations < 2:
+            raise SettingsError(
+                "the settings of edges need width, height and cell of 1 or more, and 2 orientations or more"
+            )
+
+    def describe(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
+        """(n, dimensions): contrast and directions, each of length 1/sqrt(2), or 0 without any contrast."""
+        values = np.sqrt(reduced(grey(images), self.height, self.width) / np.float32(255))
+        smooth = blurred(values, 0.7)
+        contrast, directions = unit(_contrast(smooth), FLAT), unit(self._directions(smooth), FLAT)
+        return np.concatenate([contrast, directions], axis=1) * np.float32(np.sqrt(0.5))
+
+    def _directions(self, values: Values) -> NDArray[np.float32]:
+        """(n, orientations, rows, columns) how much of each cell's edges runs which way, around its mean."""
+        down, across = _slopes(values)
+        length = np.hypot(down, across)
+        at = np.arctan2(down, across) * np.float32(self.orientations / np.pi)
+        rows, columns = (_cells(side, self.cell) for side in values.shape[1:])
+        histogram = np.stack(
+            [
+                rows @ (length * _share(at, b, self.orientations)) @ columns.T
+                for b in range(self.orientations)
+            ],
+            axis=1,
+        )
+        strength = blurred(np.sqrt(np.square(histogram).sum(1)), 1.0)
+        strength = strength + np.float32(0.02) * strength.mean((1, 2), keepdims=True) + np.float32(1e-6)
+        root = np.sqrt(histogram / strength[:, None])
+        return np.asarray(root - root.mean((2, 3), keepdims=True), np.float32)
+
+
+def _contrast(values: Values) -> Values:
+    """Each value minus the mean of its surroundings, over their deviation; reduced by half."""
+    mean = blurred(values, SURROUNDINGS)
+    deviation = np.sqrt(np.maximum(blurred(values * values, SURROUNDINGS) - mean * mean, 0))
+    floor = np.float32(0.15) * deviation.mean((1, 2), keepdims=True) + np.float32(1e-3)
+    rows, columns = values.shape[1:]
+    return reduced((values - mean) / (deviation + floor), _half(rows), _half(columns))
+
+
+def _slopes(values: Values) -> tuple[Values, Values]:
+    """Central differences down the rows and across the columns; 0 along a side of one pixel."""
+    down, across = (
+        np.gradient(values, axis=axis) if values.shape[axis] > 1 else np.zeros_like(values) for axis in (1, 2)
+    )
+    return down, across
+
+
+def _cells(side: int, cell: int) -> NDArray[np.float32]:
+    """(cells, side): the mean over each cell's pixels."""
+    return reduction(side, max(side // cell, min(side, 4)), 0.0)
+
+
+def _share(at: Values, bin_: int, bins: int) -> Values:
+    """How much of an edge whose direction is `at`, in bins around half a turn, counts for one bin: linear."""
+    away = np.abs(
+        np.mod(at - np.float32(bin_) + np.float32(bins / 2), np.float32(bins)) - np.float32(bins / 2)
+    )
+    return np.asarray(np.maximum(1 - away, 0), np.float32)
+
+
+def _half(side: int) -> int:
+    """Half a side, but no fewer than 16 pixels where there are so many."""
+    return max(side // 2, min(side, 16))
