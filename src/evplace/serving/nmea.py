@@ -1,6 +1,6 @@
 """Matches as NMEA 0183: a GGA and an RMC sentence each, so that whatever reads a GPS receiver can read them.
 
-The time is the host's. Quality 6 (estimated) and mode E say that this is no satellite fix; quality 0 and status
+The time is the host's. Quality 6 (estimated) and mode E say that it is no satellite fix, quality 0 and status
 V say that there is no position.
 """
 
