@@ -128,7 +128,7 @@ def opened(args: Args) -> Iterator[Service]:
         if args.zenoh is not None:
             from evplace.serving.ros import Topics
 
-            topics = Topics(args.zenoh, service, args.zenoh_router)
+            topics = Topics(args.zenoh, place_map, args.zenoh_router)
             stack.callback(topics.close)
             service.outputs.append(topics.publish)
         yield service
