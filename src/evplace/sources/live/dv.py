@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ class Streaming:
             for item in self._once():
                 begun = begun or isinstance(item, Block)
                 yield item
-            if begun:
+            if begun and not self._closed.is_set():
                 self.lost += 1
                 begun = False
                 yield ANEW
@@ -95,8 +95,16 @@ class Streaming:
                 else:
                     yield item
         finally:
-            child.kill()
-            child.wait()
+            _end(child, reading, found)
+
+
+def _end(child: subprocess.Popen[bytes], reading: threading.Thread, found: queue.Queue[Item | Size]) -> None:
+    """End a child, and the thread that hears it, which may wait for room."""
+    child.kill()
+    while reading.is_alive():
+        with contextlib.suppress(queue.Empty):
+            found.get(timeout=WAIT_S)
+    child.communicate()
 
 
 def _read(child: subprocess.Popen[bytes], found: queue.Queue[Item | Size]) -> None:
@@ -110,6 +118,3 @@ def _read(child: subprocess.Popen[bytes], found: queue.Queue[Item | Size]) -> No
                 found.put((said["size"][0], said["size"][1]))
     except (EOFError, EvplaceError, ValueError):
         return
-    finally:
-        if sys.platform != "win32":
-            child.stdout.close()

@@ -39,7 +39,7 @@ class Replay:
 
     def __post_init__(self) -> None:
         if not 0 <= self.speed <= FASTEST:
-            raise SettingsError(f"the setting 'speed' cannot be {self.speed}: it takes 0 to {FASTEST:g}")
+            raise SettingsError(f"the setting 'speed' cannot be {self.speed}: it takes above 0 to {FASTEST:g}")
         if self.loops < 0:
             raise SettingsError(f"the setting 'loops' cannot be {self.loops}: it takes 0 (for ever) or more")
 
@@ -85,7 +85,7 @@ class Replaying:
         """Pause or go on, change the speed, wind on or back by seconds; SettingsError if it cannot."""
         if speed is not None and not (0 < speed <= FASTEST and self._speed):
             raise SettingsError(
-                f"the speed of this replay cannot become {speed:g}: it takes 0 to {FASTEST:g}"
+                f"the speed of this replay cannot become {speed:g}: it takes above 0 to {FASTEST:g}"
             )
         self.paused = self.paused if paused is None else paused
         self._speed = self._speed if speed is None else speed

@@ -76,13 +76,17 @@ class Listening:
         """Where it listens."""
         self._socket, self._layout = listening, layout
         self._closed = threading.Event()
+        self._begun = False
 
     def close(self) -> None:
         """End the listening."""
         self._closed.set()
+        if not self._begun:
+            self._socket.close()
 
     def blocks(self) -> Iterator[Item]:
         """The events of the packets; a packet that is none is counted as lost."""
+        self._begun = True
         with self._socket:
             while not self._closed.is_set():
                 parts = list(self._packets())

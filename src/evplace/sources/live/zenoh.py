@@ -61,15 +61,19 @@ class Subscribed:
         self._decode = Packets(aligned=True)
         self._messages: queue.Queue[tuple[bytes, bytes]] = queue.Queue(HELD)
         self._closed = threading.Event()
+        self._begun = False
         self._session = session
         self._subscriber = session.declare_subscriber(key, self._take)
 
     def close(self) -> None:
         """End the listening."""
         self._closed.set()
+        if not self._begun:
+            self._session.close()
 
     def blocks(self) -> Iterator[Item]:
         """The events of the messages; one that cannot be decoded is counted as lost."""
+        self._begun = True
         try:
             while not self._closed.is_set():
                 try:
@@ -83,7 +87,6 @@ class Subscribed:
                     self._publisher, self._decode = publisher, Packets(aligned=True)
                 yield self._events(data)
         finally:
-            self._subscriber.undeclare()
             self._session.close()
 
     def _events(self, data: bytes) -> Item:
