@@ -1,4 +1,4 @@
-"""A browser that is told what to do over its debugging port: pages as people see them, and what they ask for."""
+"""A browser that is told what to do over its debugging port: pages as people see them."""
 
 from __future__ import annotations
 
@@ -113,7 +113,8 @@ def opened(profile: Path, wait: Callable[[float], None] = time.sleep) -> Iterato
         port = profile / "DevToolsActivePort"
         until_s = time.monotonic() + HANG_S
         while not (port.exists() and len(port.read_text().split()) == 2):
-            assert time.monotonic() < until_s and process.poll() is None, "the browser did not start"
+            assert time.monotonic() < until_s, "the browser did not start"
+            assert process.poll() is None, "the browser ended"
             wait(0.05)
         number = port.read_text().split()[0]
         with connect(_page_of(number), max_size=None, open_timeout=HANG_S) as socket:

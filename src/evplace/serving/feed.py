@@ -130,16 +130,14 @@ class Feed:
                 if self._closed:
                     break
                 self._push(item)
-            self._put(self._sieve.flush().blocks)
         except EvplaceError as error:
-            self._put(self._sieve.flush().blocks)
             self.fault = str(error)
         except Exception as error:  # a source of another package may raise anything: the service goes on
             self.fault = f"the source failed: {type(error).__name__}: {error}"
-        finally:
-            with self._change:
-                self.ended = True
-                self._change.notify_all()
+        self._put(self._sieve.flush().blocks)
+        with self._change:
+            self.ended = True
+            self._change.notify_all()
 
     def _push(self, item: object) -> None:
         if item is None:

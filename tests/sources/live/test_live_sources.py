@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import os
 import socket
 import struct
@@ -21,12 +22,13 @@ from evplace.core import families
 from evplace.core.errors import DamagedRecordingError, RecordingError, SettingsError
 from evplace.core.events import Events
 from evplace.sources.live import ANEW, Facts, Item, Live, address, open_live, source_of
-from evplace.sources.live._bytes import PACKED, ByteStream
+from evplace.sources.live._bytes import ByteStream
 from evplace.sources.live.replay import Replay, Replaying
 from evplace.sources.live.stdin import Piped
 from evplace.sources.live.udp import UDP, Listening
 from evplace.sources.readers import Block, open_recording
 from evplace.sources.writers import write_recording
+from made_streams import faery_datagrams, packed
 
 SIZE = (80, 60)
 
@@ -57,12 +59,6 @@ def until(live: Live, events: int) -> list[Item]:
             break
     live.close()
     return found
-
-
-def packed(events: Events) -> bytes:
-    table = np.zeros(len(events), PACKED)
-    table["t"], table["x"], table["y"], table["p"] = events.t_us, events.x, events.y, events.p
-    return table.tobytes()
 
 
 def test_addresses_say_the_kind() -> None:
@@ -185,7 +181,7 @@ def test_bytes_in_parts_of_any_length_are_the_same_events(
     stream = ByteStream("packed" if format == "packed" else None)
     edges = [0, *sorted(min(cut, len(data)) for cut in cuts), len(data)]
     found: list[Item] = []
-    for start, stop in zip(edges, edges[1:], strict=False):
+    for start, stop in itertools.pairwise(edges):
         found.extend(stream.push(data[start:stop]))
     same(joined(found), drive)
 
@@ -252,10 +248,6 @@ def sent(live: Live, datagrams: list[bytes]) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for data in datagrams:
             sender.sendto(data, ("127.0.0.1", live.port))
-
-
-def faery_datagrams(events: Events) -> list[bytes]:
-    return [packed(events[at : at + 100]) for at in range(0, len(events), 100)]
 
 
 def faery_32_datagrams(events: Events) -> list[bytes]:

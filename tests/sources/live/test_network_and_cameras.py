@@ -61,7 +61,8 @@ def free_port() -> int:
 SENDER = """
 import sys, time
 import dv_processing as dv
-writer = dv.io.NetworkWriter("127.0.0.1", int(sys.argv[1]), dv.io.Stream.EventStream(0, "events", "made", (80, 60)))
+stream = dv.io.Stream.EventStream(0, "events", "made", (80, 60))
+writer = dv.io.NetworkWriter("127.0.0.1", int(sys.argv[1]), stream)
 print("ready", flush=True)
 while not writer.getClientCount():
     time.sleep(0.01)
@@ -229,7 +230,7 @@ def test_a_publisher_that_is_started_again_begins_anew(drive: Events, network: A
 
 @needs_zenoh
 def test_no_router_is_one_line() -> None:
-    with pytest.raises(RecordingError, match="no zenoh router at tcp/127.0.0.1"):
+    with pytest.raises(RecordingError, match=r"no zenoh router at tcp/127\.0\.0\.1"):
         open_live("zenoh:events", router=f"tcp/127.0.0.1:{free_port()}")
 
 
@@ -331,5 +332,5 @@ def test_a_camera_that_is_unplugged_is_said_after_what_came(plug: Plug) -> None:
 
 def test_the_drivers_themselves_say_that_there_is_no_camera() -> None:
     pytest.importorskip("neuromorphic_drivers", reason="neuromorphic-drivers is not installed")
-    with pytest.raises(RecordingError, match="no USB|no event camera with the serial"):
+    with pytest.raises(RecordingError, match=r"no USB|no event camera with the serial"):
         open_live("usb:none-has-this")
