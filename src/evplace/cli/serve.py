@@ -29,7 +29,7 @@ from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 from evplace.serving.nmea import sentences
 from evplace.serving.outputs import Output
-from evplace.serving.server import bound, check_web, serve
+from evplace.serving.server import Stop, bound, check_web, serve
 from evplace.serving.service import Service
 from evplace.sources.live import Facts, address, open_live
 
@@ -135,20 +135,18 @@ def opened(args: Args) -> Iterator[Service]:
 
 
 async def _serve(args: Args, service: Service, listening: Any, token: str | None, address: str) -> None:
-    def ready() -> None:
+    def ready(stop: Stop) -> None:
         query = f"?token={token}" if token and args.token else ""
         note(f"{args.source} is localised in {args.map}: open {address}{query}; Ctrl-C ends it")
         if args.stop_at_end:
-            threading.Thread(target=_end_with, args=(service,), daemon=True).start()
+            threading.Thread(target=_end_with, args=(service, stop), daemon=True).start()
 
     await serve(service, listening, token, args.allow, ready)
 
 
-def _end_with(service: Service) -> None:
-    import signal
-
+def _end_with(service: Service, stop: Stop) -> None:
     service.drive.ended.wait()
-    signal.raise_signal(signal.SIGTERM)
+    stop()
 
 
 def _say_end(service: Service) -> None:

@@ -22,6 +22,11 @@ class Quiet(uvicorn.Server):
         """Nothing."""
         yield
 
+    def end(self) -> None:
+        """End well; called again, at once."""
+        self.force_exit = self.should_exit
+        self.should_exit = True
+
 
 class Patient(H11Protocol):
     """Closes a connection whose request's head has not come within HEADER_S seconds."""

@@ -8,6 +8,7 @@ import logging
 import signal
 import socket
 import sys
+import threading
 from collections.abc import Callable, Generator
 from typing import Any
 
@@ -25,6 +26,8 @@ DRAIN_S = 1
 """Seconds that requests in progress are waited for at the end."""
 CLOSE_S = 0.6
 """Seconds within which the drive ends."""
+Stop = Callable[[], object]
+"""Ends a server, from any thread."""
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
@@ -65,9 +68,12 @@ async def serve(
     listening: socket.socket,
     token: str | None,
     names: tuple[str, ...],
-    ready: Callable[[], None],
+    ready: Callable[[Stop], None],
 ) -> None:
-    """Serve until a signal comes; `ready` is called once pages are answered."""
+    """Serve until a signal comes, or until what `ready` is given is called.
+
+    `ready` is called once pages are answered. Signals are heard on the main thread alone.
+    """
     import uvicorn
 
     from evplace.serving._connections import Patient, Quiet
@@ -98,7 +104,7 @@ async def serve(
         serving = asyncio.create_task(server.serve(sockets=[listening]))
         while not server.started and not serving.done():
             await asyncio.sleep(0.01)
-        ready()
+        ready(lambda: loop.call_soon_threadsafe(server.end))
         await serving
         await asyncio.to_thread(service.drive.close, CLOSE_S)  # while there is a loop to report to
 
@@ -107,14 +113,11 @@ async def serve(
 def _signals(loop: asyncio.AbstractEventLoop, server: Any) -> Generator[None, None, None]:
     """SIGTERM and Ctrl-C end the server well; a second one at once."""
 
-    def end(*_: object) -> None:
-        server.force_exit = server.should_exit
-        server.should_exit = True
-
-    names = [signal.SIGINT, signal.SIGTERM]
+    main = threading.current_thread() is threading.main_thread()
+    names = [signal.SIGINT, signal.SIGTERM] if main else []
     before = {name: signal.getsignal(name) for name in names}
     for name in names:
-        signal.signal(name, lambda *_: loop.call_soon_threadsafe(end))
+        signal.signal(name, lambda *_: loop.call_soon_threadsafe(server.end))
     try:
         yield
     finally:

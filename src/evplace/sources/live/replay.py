@@ -39,7 +39,7 @@ class Replay:
 
     def __post_init__(self) -> None:
         if not 0 <= self.speed <= FASTEST:
-            raise SettingsError(f"the setting 'speed' cannot be {self.speed}: it takes above 0 to {FASTEST:g}")
+            raise SettingsError(f"the setting 'speed' cannot be {self.speed}: it takes 0 to {FASTEST:g}")
         if self.loops < 0:
             raise SettingsError(f"the setting 'loops' cannot be {self.loops}: it takes 0 (for ever) or more")
 
