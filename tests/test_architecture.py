@@ -23,19 +23,20 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places scorers placemap matchers localizer serving evaluation doctor "
+        "core sources imaging drives places scorers matchers placemap localizer serving evaluation doctor "
         "testing cli"
     ),
-    "evplace.core": "errors events grey settings families storage workers drawing",
+    "evplace.core": "errors events grey zscores settings families storage workers drawing",
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",
     "evplace.imaging": (
-        "windows _resampling representations tones images recipe stream spacing traverse sheets"
+        "windows _resampling representations tones images activity averaging recipe stream spacing traverse "
+        "sheets"
     ),
     "evplace.drives": "datasets to_traverse",
-    "evplace.scorers": "_search _distances _reduction _seqslam_images _network",
+    "evplace.scorers": "_search _reduction _compressed _distances _seqslam_images _network",
     "evplace.scorers._network": "network network_onnx augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
-    "evplace_lab": "city reproduction report cli",
+    "evplace_lab": "city descriptor reproduction report cli",
 }
 """Package -> its parts in the order of the data: a part imports only parts before it, or files of its own."""
 

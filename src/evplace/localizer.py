@@ -9,7 +9,7 @@ hindsight knows is asked for by name.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
@@ -19,21 +19,29 @@ from numpy.typing import NDArray
 from evplace.core import families
 from evplace.core.errors import PartError, PlaceMapError, RecordingError
 from evplace.core.events import Events
-from evplace.core.settings import to_dict
+from evplace.core.settings import make, to_dict
+from evplace.imaging.activity import Activity
+from evplace.imaging.averaging import Averager
 from evplace.imaging.recipe import shown
 from evplace.imaging.stream import EventImage, EventImages
 from evplace.imaging.traverse import Traverse
-from evplace.matchers import Answer, Estimate, Matcher, Matching, Path, stepped
+from evplace.matchers import Answer, Estimate, Following, Matcher, Path, Seen
 from evplace.matchers import State as StateOfAnswer
 from evplace.matchers._checks import check_answer, check_path
-from evplace.placemap import PlaceMap
+from evplace.matchers._drives import follow, in_hindsight
+from evplace.placemap import PlaceMap, default_matcher
 from evplace.scorers import OpenScorer, Rows, scorer_of
 from evplace.sources.cleaning import MaskSource, read_mask
 
+BLOCK = 64
+"""Images scored at once in hindsight."""
 Answers = Literal["live", "hindsight"]
 """What the camera would have been told as it drove; or what is known once the drive is over."""
 State = StateOfAnswer | Literal["no-events"]
 """What a match is worth: see `evplace.matchers.State`; no-events: the window was empty."""
+
+FOLLOWS_US = 33_333
+"""How long after the last image of one clock the first of another is taken to be, in microseconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,26 +88,28 @@ class Localizer:
     def __init__(
         self,
         place_map: PlaceMap,
-        matcher: str | Matcher = "local",
+        matcher: str | Matcher | None = None,
         preset: str | None = None,
         mask: MaskSource | None = None,
         **settings: object,
     ) -> None:
-        """For one map, with a matcher by name, one of its presets, and its settings; or with an object.
+        """For one map, with its own matcher, or another by name, preset and settings, or an object.
 
-        `Localizer(campus, matchers.Local(K=5))` and `Localizer(campus, "local", K=5)` are the same. Events
-        are cleaned as those of the map were. Which pixels are hot belongs to the drive, so a map that was
-        learned without hot pixels needs the drive's own `mask` (see `evplace.sources.cleaning.read_mask`,
-        and `pixel_mask` to measure it). Raises SettingsError for an unknown matcher, preset or setting.
+        `Localizer(campus, matchers.Local(K=5))` and `Localizer(campus, "local", K=5)` are the same; settings
+        without a name are those of the map's own matcher. Events are cleaned as those of the map were. Which
+        pixels are hot belongs to the drive, so a map that was learned without hot pixels needs the drive's
+        own `mask` (see `evplace.sources.cleaning.read_mask`, and `pixel_mask` to measure it). Raises
+        SettingsError for an unknown matcher, preset or setting.
         """
         self.map = place_map
-        self.matcher: Matcher = families.make("matchers", matcher, preset, settings)
+        self.matcher: Matcher = _matcher(place_map, matcher, preset, settings)
         """The matcher with its settings; `reset` begins with it anew."""
         self.mask = mask
         """Pixels of the drive to leave out; it counts from the first packet of a drive."""
         with families.blaming("scorers", place_map.scorer):
             self.scorer: OpenScorer = scorer_of(place_map.scorer).open(place_map.content)
             self._distances = bool(self.scorer.distances)
+        self._route = place_map.route(learned=type(self.matcher) is type(place_map.matcher))
         self.reset()
 
     @property
@@ -110,12 +120,14 @@ class Localizer:
     def reset(self) -> None:
         """Forget the drive so far."""
         with families.blaming("matchers", self.matcher):
-            self._matching: Matching = self.matcher.start(self._distances)
+            self._following: Following = follow(self.matcher, self._route, self._distances)
         self._stepped = 0
         self.image: NDArray[np.uint8] | None = None
         """The last image that was matched."""
         self._images: EventImages | None = None
-        self._times_us: list[int] = []
+        self._seeing = _Seeing(self.map)
+        self._clock = _Clock()
+        self._times_us: dict[int, int] = {}
 
     def push(self, events: Events) -> Iterator[Match]:
         """The matches of all windows that `events` bring to their end."""
@@ -139,22 +151,25 @@ class Localizer:
 
         For a camera that was started again: what the matcher knows of the drive is kept.
         """
-        yield from self.finish()
-        self._images = None
-
-    def finish(self) -> Iterator[Match]:
-        """The match of the last window, when the drive is over."""
         if self._images is not None:
             for image in self._images.finish():
                 yield from self._matches_of(image)
+        self._images = None
+        self._clock.begin_anew()
+
+    def finish(self) -> Iterator[Match]:
+        """The matches that are still to come when the drive is over: that of the last window is one."""
+        if self._images is not None:
+            for image in self._images.finish():
+                yield from self._matches_of(image)
+        yield from self._matches(self._finish())
 
     def push_image(self, image: NDArray[np.uint8], t_us: int) -> Iterator[Match]:
         """The matches that become known with one more image (h, w) or (h, w, C)."""
         self.image = image
-        self._times_us.append(t_us)
-        answer = self._step(self.rows(image[None])[0])
-        if answer is not None:
-            yield self._match(self._times_us[answer.query], answer)
+        self._times_us[self._stepped] = t_us
+        mean, seen = self._seeing.see(image, self._clock.passed(t_us))
+        yield from self._matches(self._step(self.rows(mean[None])[0], seen))
 
     def match_traverse(self, traverse: Traverse) -> Iterator[Match]:
         """The matches of a traverse's images, as `push` would give them for its events.
@@ -167,9 +182,13 @@ class Localizer:
                 yield _no_events(int(t_us))
             else:
                 yield from self.push_image(image, int(t_us))
+        yield from self._matches(self._finish())
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
-        """(n, items) score rows of images; PlaceMapError where they have not the shape of the map's."""
+        """(n, items) score rows of images as the scorer takes them, averaged where it wants them so.
+
+        PlaceMapError where they have not the shape of the map's.
+        """
         if images.shape[1:] != self.map.image_shape:
             raise PlaceMapError(
                 f"the map was made from images of shape {self.map.image_shape}, these are "
@@ -192,45 +211,79 @@ class Localizer:
         self.map.require_same(query)
         self.reset()
         filled = np.flatnonzero(query.counts != 0)
-        if rows is None:
-            rows = self._rows_of(query, filled, answers)
+        rows, seen = self._seen_of(query, filled, answers, rows)
         live = answers == "live"
-        found, delay = stepped(self._step, rows[filled]) if live else self._in_hindsight(rows[filled])
+        found, delay = self._live(rows[filled], seen) if live else self._in_hindsight(rows[filled], seen)
         item = np.full(len(query), -1, np.int64)
         score = np.full(len(query), np.nan)
         accepted = np.zeros(len(query), np.bool_)
         item[filled], score[filled], accepted[filled] = found.item, found.score, found.accepted
         return Answered(Path(item, score, accepted), rows, delay)
 
-    def _rows_of(self, query: Traverse, filled: NDArray[np.int64], answers: Answers) -> Rows:
-        """(n, items): live, image by image, since the size of a batch may change the last bits of a score."""
-        rows = np.zeros((len(query), len(self.map.items)), np.float32)
-        if answers == "live":
-            for at in filled:
-                rows[at] = self.rows(np.asarray(query.images[at : at + 1]))[0]
-        elif len(filled):
-            rows[filled] = self.rows(np.asarray(query.images[filled]))
-        return rows
+    def _seen_of(
+        self, query: Traverse, filled: NDArray[np.int64], answers: Answers, rows: Rows | None
+    ) -> tuple[Rows, list[Seen]]:
+        """(n, items) rows, made where they are not given, and what else is seen of the images `filled`.
 
-    def _in_hindsight(self, rows: Rows) -> tuple[Path, int]:
+        Live, image by image, since the size of a batch may change the last bits of a score.
+        """
+        made = np.zeros((len(query), len(self.map.items)), np.float32) if rows is None else rows
+        seen: list[Seen] = []
+        block = 1 if answers == "live" else BLOCK
+        for start in range(0, len(filled), block):
+            part = filled[start : start + block]
+            pairs = [self._seeing.see(np.asarray(query.images[at]), int(query.t_us[at])) for at in part]
+            seen += [one for _, one in pairs]
+            if rows is None:
+                made[part] = self.rows(np.stack([mean for mean, _ in pairs]))
+        return made, seen
+
+    def _live(self, rows: Rows, seen: list[Seen]) -> tuple[Path, int]:
+        """The answers, and how many images later one was known at most; -1 where none was ever given."""
+        known = [Answer(at, -1, np.nan, False) for at in range(len(rows))]
+        delay = 0
+        for at, (row, one) in enumerate(zip(rows, seen, strict=True)):
+            for answer in self._step(row, one):
+                known[answer.query] = answer
+                delay = max(delay, at - answer.query)
+        for answer in self._finish():
+            known[answer.query] = answer
+        return Path.of(known), delay
+
+    def _in_hindsight(self, rows: Rows, seen: list[Seen]) -> tuple[Path, int]:
         with families.blaming("matchers", self.matcher):
-            self._matching.extend(rows)
-            found = self._matching.path()
+            found = in_hindsight(self.matcher, self._route, self._distances, rows, seen)
         check_path(found, len(rows), len(self.map.items), self.matcher)
         return found, max(0, len(rows) - 1)
 
-    def _step(self, row: Rows) -> Answer | None:
+    def _step(self, row: Rows, seen: Seen) -> list[Answer]:
         with families.blaming("matchers", self.matcher):
-            answer = self._matching.step(row)
+            answers = self._following.step(row, seen)
         self._stepped += 1
-        check_answer(answer, self._stepped, len(self.map.items), self.matcher)
-        return answer
+        return self._checked(answers)
+
+    def _finish(self) -> list[Answer]:
+        with families.blaming("matchers", self.matcher):
+            answers = self._following.finish()
+        return self._checked(answers)
+
+    def _checked(self, answers: list[Answer]) -> list[Answer]:
+        for answer in answers:
+            check_answer(answer, self._stepped, len(self.map.items), self.matcher)
+        return answers
 
     def _matches_of(self, image: EventImage) -> Iterator[Match]:
         if image.window.events:
             yield from self.push_image(image.image, image.window.t_us)
         else:
             yield _no_events(image.window.t_us)
+
+    def _matches(self, answers: list[Answer]) -> Iterator[Match]:
+        for answer in answers:
+            t_us = self._times_us[answer.query]
+            for query in [query for query in self._times_us if query <= answer.query]:
+                del self._times_us[query]
+            yield self._match(t_us, answer)
 
     def _match(self, t_us: int, answer: Answer) -> Match:
         """An answer of the matcher, with what the map knows of its item."""
@@ -259,6 +312,53 @@ class Localizer:
             )
         mask = None if self.mask is None else read_mask(self.mask, events.size)
         return EventImages(events.size, recipe, mask)
+
+
+class _Seeing:
+    """What a map's scorer is shown of an image, and what its matcher is told of it."""
+
+    def __init__(self, place_map: PlaceMap) -> None:
+        averaging = getattr(place_map.scorer, "averaging", None)
+        self._averager = Averager(averaging) if averaging is not None else None
+        self._activity = Activity(of_events=place_map.recipe is None or place_map.recipe.kind == "events")
+
+    def see(self, image: NDArray[np.uint8], t_us: int) -> tuple[NDArray[np.uint8], Seen]:
+        """The image, averaged with those before it where the scorer wants that."""
+        mean = image if self._averager is None else self._averager.push(image, t_us)
+        return mean, Seen(t_us, self._activity.push(mean))
+
+
+class _Clock:
+    """The time of a drive, which goes on where the camera's clock begins anew."""
+
+    def __init__(self) -> None:
+        self._shift_us = 0
+        self._last_us: int | None = None
+        self._anew = False
+
+    def begin_anew(self) -> None:
+        """The next time is of another clock."""
+        self._anew = self._last_us is not None
+
+    def passed(self, t_us: int) -> int:
+        """A time of the camera's clock as one of the drive; the first of another clock follows the last."""
+        if self._anew and self._last_us is not None:
+            self._shift_us, self._anew = self._last_us + FOLLOWS_US - t_us, False
+        self._last_us = t_us + self._shift_us
+        return self._last_us
+
+
+def _matcher(
+    place_map: PlaceMap, matcher: str | Matcher | None, preset: str | None, settings: Mapping[str, object]
+) -> Matcher:
+    """The matcher that is asked for: by default the map's own, with other settings where some are given."""
+    own = place_map.matcher or default_matcher(place_map)
+    made: Matcher = (
+        make(type(own), settings, own)
+        if matcher is None and preset is None
+        else families.make("matchers", own if matcher is None else matcher, preset, settings)
+    )
+    return made
 
 
 def check_rows(rows: object, images: int, place_map: PlaceMap) -> None:

@@ -97,7 +97,7 @@ def piped(events: Events, folder: Path) -> Live:
 
 
 @pytest.mark.parametrize("opened", [replayed, paced, piped])
-@pytest.mark.parametrize("matcher", ["best", "local", "seqslam"])
+@pytest.mark.parametrize("matcher", ["best", "local", "seqslam", "bayes"])
 def test_live_is_offline(
     opened: Callable[[Events, Path], Live],
     matcher: str,

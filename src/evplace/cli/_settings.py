@@ -85,17 +85,21 @@ class Part:
         return self.pairs, self.preset, self.chooser
 
     @classmethod
-    def of(cls, family: str, word: str, pairs: str = "set", preset: str = "") -> Part:
-        """The part of a family that the flag `word` names."""
-        return cls(
-            pairs,
-            preset,
-            word,
-            lambda args: (
-                f"the {word} '{getattr(args, word)}'",
-                *families.settings_of(family, getattr(args, word)),
-            ),
-        )
+    def of(
+        cls,
+        family: str,
+        word: str,
+        pairs: str = "set",
+        preset: str = "",
+        usual: Callable[[Any], str] | None = None,
+    ) -> Part:
+        """The part of a family that the flag `word` names, or where it names none, `usual` of the Args."""
+
+        def chosen(args: Any) -> tuple[str, type[Any], Mapping[str, Any]]:
+            name = getattr(args, word) or (usual(args) if usual is not None else "")
+            return (f"the {word} '{name}'", *families.settings_of(family, name))
+
+        return cls(pairs, preset, word, chosen)
 
     def resolved(self, args: Any, values: Mapping[str, object]) -> object | None:
         """The part's settings, `values` over its preset; SettingsError for a wrong preset, name or value."""

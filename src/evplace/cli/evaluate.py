@@ -17,6 +17,7 @@ from typing import Annotated, ClassVar, Literal
 
 import tyro
 
+from evplace.cli._matcher import of_map, settings_of_matcher
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
 from evplace.cli._recording import DriveFlags
 from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
@@ -49,7 +50,7 @@ class Args(TrackFlags, DriveFlags):
     """Flags of `evplace evaluate`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (
-        *TrackFlags.PARTS, Part.of("matchers", "matcher", preset="preset"),
+        *TrackFlags.PARTS, Part.of("matchers", "matcher", preset="preset", usual=of_map),
     )  # fmt: skip
 
     map: tyro.conf.Positional[Path]
@@ -71,10 +72,15 @@ class Args(TrackFlags, DriveFlags):
     """For --rule radius: metres that an answer may be away."""
     answers: Literal["live", "hindsight"] = "live"
     """live: what the camera would have known as it drove. hindsight: what is known once it has arrived."""
-    matcher: Annotated[str, a_part_of("matchers")] = "local"
-    """How score rows become answers; `evplace list matchers` says what each does."""
+    matcher: Annotated[str | None, a_part_of("matchers")] = None
+    """How score rows become answers; `evplace list matchers` says what each does. Default: as the map
+    remembers."""
     preset: Annotated[str | None, a_preset_of("matchers")] = None
     """A preset of the matcher."""
+    false_accept: float | None = None
+    """For bayes: the share of the images of places never seen that may be accepted. (0.01)"""
+    lag_s: float | None = None
+    """For bayes: seconds that an answer waits for what comes next; it is better then. (0)"""
     set: Pairs = ()
     """A setting of the matcher, as name=value."""
     mask: Path | None = None
@@ -99,7 +105,7 @@ def run(args: Args) -> int:
     if args.frames is not None and args.frames < 0:
         raise SettingsError(f"--frames is how many items off an answer may be, 0 or more, not {args.frames}")
     place_map = PlaceMap.load(args.map)
-    where = Localizer(place_map, args.matcher, args.preset, args.mask, **dict(args.set))
+    where = Localizer(place_map, args.matcher, args.preset, args.mask, **settings_of_matcher(args))
     query = _opened(args, place_map)
     reference = Traverse.load(args.reference) if args.reference is not None else None
     truth = _truth(args, place_map, query)

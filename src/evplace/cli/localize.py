@@ -22,6 +22,7 @@ from typing import Annotated, ClassVar
 
 import tyro
 
+from evplace.cli._matcher import of_map, settings_of_matcher
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.cli._recording import DriveFlags
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
@@ -46,16 +47,21 @@ COLUMNS = (
 class Args(SettingsFlags, DriveFlags):
     """Flags of `evplace localize`."""
 
-    PARTS: ClassVar[tuple[Part, ...]] = (Part.of("matchers", "matcher", preset="preset"),)
+    PARTS: ClassVar[tuple[Part, ...]] = (Part.of("matchers", "matcher", preset="preset", usual=of_map),)
 
     map: tyro.conf.Positional[Path]
     """A map that `evplace train` wrote."""
     source: tyro.conf.Positional[Path]
     """An event recording, a video, a folder of images, a data set or a traverse folder."""
-    matcher: Annotated[str, a_part_of("matchers")] = "local"
-    """How score rows become answers; `evplace list matchers` says what each does."""
+    matcher: Annotated[str | None, a_part_of("matchers")] = None
+    """How score rows become answers; `evplace list matchers` says what each does. Default: as the map
+    remembers."""
     preset: Annotated[str | None, a_preset_of("matchers")] = None
     """A preset of the matcher."""
+    false_accept: float | None = None
+    """For bayes: the share of the images of places never seen that may be accepted. (0.01)"""
+    lag_s: float | None = None
+    """For bayes: seconds that an answer waits for what comes next; it is better then. (0)"""
     set: Pairs = ()
     """A setting of the matcher, as name=value: K=5, tau1=0.99, tau2=0.01 for local."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
@@ -108,7 +114,9 @@ class _Drive:
 
 def run(args: Args) -> int:
     """Localise and print, or write, the matches."""
-    where = Localizer(PlaceMap.load(args.map), args.matcher, args.preset, args.mask, **dict(args.set))
+    where = Localizer(
+        PlaceMap.load(args.map), args.matcher, args.preset, args.mask, **settings_of_matcher(args)
+    )
     matches = _Drive(where, args)
     if args.out is not None:
         with (

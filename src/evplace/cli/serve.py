@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+from evplace.cli._matcher import of_map, settings_of_matcher
 from evplace.cli._output import note, note_guesses
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.core import families
@@ -47,7 +48,7 @@ class Args(SettingsFlags):
     """Flags of `evplace serve`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (
-        Part.of("matchers", "matcher", preset="preset"),
+        Part.of("matchers", "matcher", preset="preset", usual=of_map),
         Part("source_set", "", "source", _source_part),
     )
 
@@ -58,10 +59,15 @@ class Args(SettingsFlags):
     `evplace list live`."""
     source_set: Pairs = ()
     """A setting of the source, as name=value: speed=2, loops=0, layout=spif, format=evt3 ..."""
-    matcher: Annotated[str, a_part_of("matchers")] = "local"
-    """How score rows become answers; `evplace list matchers` says what each does."""
+    matcher: Annotated[str | None, a_part_of("matchers")] = None
+    """How score rows become answers; `evplace list matchers` says what each does. Default: as the map
+    remembers."""
     preset: Annotated[str | None, a_preset_of("matchers")] = None
     """A preset of the matcher."""
+    false_accept: float | None = None
+    """For bayes: the share of the images of places never seen that may be accepted. (0.01)"""
+    lag_s: float | None = None
+    """For bayes: seconds that an answer waits for what comes next; it is better then. (0)"""
     set: Pairs = ()
     """A setting of the matcher, as name=value."""
     mask: Path | None = None
@@ -110,7 +116,7 @@ def run(args: Args) -> int:
 def opened(args: Args) -> Iterator[Service]:
     """The service that the flags ask for, and its outputs; they end with the block."""
     place_map = PlaceMap.load(args.map)
-    where = Localizer(place_map, args.matcher, args.preset, args.mask, **dict(args.set))
+    where = Localizer(place_map, args.matcher, args.preset, args.mask, **settings_of_matcher(args))
     size = args.size or (None if place_map.recipe is None else place_map.recipe.size)
     source = open_live(args.source, size, **dict(args.source_set))
     note_guesses(list(Facts.of(source).notes))

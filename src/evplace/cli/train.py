@@ -1,9 +1,9 @@
 """Learn a route: one drive -> a map.
 
 Examples:
-  evplace train day.aedat4 --track day.nmea -o campus.evp            places of 20 m, the network
+  evplace train day.aedat4 --track day.nmea -o campus.evp            the default: nothing is trained
   evplace train day.aedat4 --track day.nmea -o campus.evp --mask-hot later drives are cleaned like it
-  evplace train day -o campus.evp --preset paper --seed 1            day is a traverse folder
+  evplace train day -o campus.evp --preset paper --seed 1            the paper's network, on a traverse folder
   evplace train day -o campus.evp --scorer ncc --set sigma=2         no training: images are the map
   evplace train day -o campus.evp --run-length 10                    no GPS: ten images are a place
   evplace train brisbane/ --drive sunset1 -o sunset1.evp             a drive of a data set, with its GPS
@@ -35,7 +35,8 @@ from evplace.imaging.images import ImageSettings
 from evplace.imaging.spacing import SpacingSettings
 from evplace.imaging.traverse import Traverse
 from evplace.imaging.windows import WindowSettings
-from evplace.placemap import MARK, train
+from evplace.matchers.local import Local
+from evplace.placemap import MARK, default_scorer, train
 from evplace.places import PlaceGrid, PlaceRuns, Places
 from evplace.scorers import Descriptor, Learning, Scorer
 from evplace.scorers.network import TrainSettings
@@ -46,7 +47,10 @@ from evplace.sources.cleaning import CleaningSettings
 class Args(TrackFlags, DriveFlags):
     """Flags of `evplace train`."""
 
-    PARTS: ClassVar[tuple[Part, ...]] = (*TrackFlags.PARTS, Part.of("scorers", "scorer", preset="preset"))
+    PARTS: ClassVar[tuple[Part, ...]] = (
+        *TrackFlags.PARTS,
+        Part.of("scorers", "scorer", preset="preset", usual=lambda args: default_scorer(args.preset)),
+    )
     TABLE_PRESETS: ClassVar[Mapping[str, Mapping[str, Any]]] = {"train": TrainSettings.presets}
 
     source: tyro.conf.Positional[Path]
@@ -59,12 +63,16 @@ class Args(TrackFlags, DriveFlags):
     """Without GPS: how many images make a place."""
     tolerance: int = 0
     """Without GPS: how many places off an answer may be."""
-    scorer: Annotated[str, a_part_of("scorers")] = "network"
-    """What compares images with the map; `evplace list scorers` says what each does."""
+    scorer: Annotated[str | None, a_part_of("scorers")] = None
+    """What compares images with the map; `evplace list scorers` says what each does. Default: fused, or that
+    of the preset."""
+    matcher: Annotated[str | None, a_part_of("matchers")] = None
+    """What the map remembers to be matched with. Default: bayes, and local where the items are places."""
     set: Pairs = ()
     """A setting of the scorer, as name=value."""
     preset: Annotated[str | None, a_preset_of("scorers")] = None
-    """A preset of the scorer. paper: trained as printed; notebook: as the author's notebook does."""
+    """best: fused, without training. paper: the paper's network, trained as printed, and its Algorithm 1;
+    notebook: trained as the author's notebook does. Or a preset of the scorer that is named."""
     train: Annotated[TrainSettings, tyro.conf.arg(name="")] = field(default_factory=TrainSettings)
     windows: Annotated[WindowSettings, tyro.conf.arg(name="")] = field(default_factory=WindowSettings)
     images: Annotated[ImageSettings, tyro.conf.arg(name="")] = field(default_factory=ImageSettings)
@@ -94,11 +102,13 @@ def run(args: Args) -> int:
             lambda step, steps, loss: show(step, steps, f"loss {loss:.3f}"),
             args.out.with_name(f".{args.out.name}.checkpoint"),
         )
-        learned = train(reference, places, scorer, learning=learning)
+        matcher = Local.presets["paper"] if args.preset == "paper" and args.matcher is None else args.matcher
+        learned = train(reference, places, scorer, learning=learning, matcher=matcher)
     seconds = time.monotonic() - began
     learned.save(args.out, args.overwrite)
     facts = {
         "scorer": families.name_of("scorers", learned.scorer),
+        "matcher": families.name_of("matchers", learned.matcher),
         "images": len(reference),
         "places": places.n,
         "items": len(learned.items),
@@ -125,10 +135,11 @@ def _places(args: Args, reference: Traverse) -> Places:
 
 def _scorer(args: Args) -> Scorer | Descriptor:
     """The scorer with its settings: for one that is trained by these flags, those of the training."""
-    if args.scorer == "network":
+    name = args.scorer or default_scorer(args.preset)
+    if name == "network":
         return make(TrainSettings, dict(args.set), args.train)
     trained = [name for name in vars(args.train) if name in args.given]
     if trained:
-        raise SettingsError(f"`{trained[0]}` means nothing for the scorer '{args.scorer}': leave it out")
-    part: Scorer | Descriptor = families.make("scorers", args.scorer, args.preset, dict(args.set))
+        raise SettingsError(f"`{trained[0]}` means nothing for the scorer '{name}': leave it out")
+    part: Scorer | Descriptor = families.make("scorers", name, args.preset, dict(args.set))
     return part

@@ -8,6 +8,7 @@ A file holds a frozen dataclass of the same name, which is a `Matcher`: `matcher
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol, runtime_checkable
 
@@ -123,7 +124,8 @@ class Seen(NamedTuple):
     t_us: int
     """Time in microseconds."""
     content: float
-    """How much its image shows: mean grey value of an event image, mean change of a camera image."""
+    """How much its image shows: mean grey level of an event image, mean change of a camera image; NaN where
+    that is not known."""
 
 
 Learned = Mapping[str, NDArray[Any]]
@@ -139,24 +141,20 @@ class Route(NamedTuple):
     """(items,) clockwise from north, NaN where unknown."""
     t_us: NDArray[np.int64] | None = None
     """(items,) times of the map's drive in microseconds; None where they are not kept."""
+    content: float = math.nan
+    """What the map's images usually show, as in Seen."""
     learned: Learned | None = None
     """What `learn` has given for this map; None where it was not asked."""
 
 
 class Following(Protocol):
-    """One traverse being matched by a matcher that knows the route; see Matching."""
+    """One traverse being matched live by a matcher that knows the route, in flat memory."""
 
-    def step(self, row: Row, seen: Seen) -> Answer | None:
-        """Take the next query; say what is known by now."""
+    def step(self, row: Row, seen: Seen) -> list[Answer]:
+        """Take the next query; say what has become known, of it or of earlier ones."""
 
     def finish(self) -> list[Answer]:
         """The drive is over: the answers that were still to come."""
-
-    def extend(self, rows: Rows, seen: Sequence[Seen]) -> None:
-        """Take many queries at once."""
-
-    def path(self) -> Path:
-        """The answers for all queries so far, in hindsight."""
 
 
 @runtime_checkable
@@ -168,6 +166,9 @@ class RouteMatcher(Protocol):
 
     def follow(self, route: Route, distances: bool = False) -> Following:
         """Begin a traverse."""
+
+    def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
+        """The answers for all queries of a traverse, once all are known."""
 
 
 class Sweep(NamedTuple):

@@ -7,8 +7,6 @@ drive); and a small share may be anywhere.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -16,15 +14,6 @@ from numpy.typing import NDArray
 Belief = NDArray[np.float64]
 """(references, speeds)."""
 Floats = NDArray[np.float64]
-
-
-class Links(NamedTuple):
-    """References that may be passed to without driving there, as lists one behind the other."""
-
-    first: NDArray[np.int64]
-    """(references + 1,) where each reference's list begins."""
-    to: NDArray[np.int64]
-    """The references linked to."""
 
 
 @njit(cache=True, nogil=True)
@@ -105,3 +94,50 @@ def pass_links_back(
             for k in range(first[r], first[r + 1]):
                 there += later[to[k], v] / many
             out[r, v] = later[r, v] if many == 0 else (1 - share) * later[r, v] + share * there
+
+
+@njit(cache=True, nogil=True)
+def read(belief: Floats, z: NDArray[np.float32], way: Floats, xy: Floats, reach: Floats, out: Floats) -> int:
+    """What a belief (references,) says; returns the answer's item.
+
+    `reach` holds metres: of the stretch of way whose belief counts together, beside the answer, of agreement,
+    and where another place begins. `out` gets the belief of the stretch; the largest score beside the answer;
+    that at other places; and whether the largest score of all agrees with the answer.
+    """
+    n = len(way)
+    begin, end, mass, most, best_begin, best_end = 0, 0, 0.0, -1.0, 0, 0
+    for r in range(n):
+        while end < n and way[end] <= way[r] + reach[0]:
+            mass += belief[end]
+            end += 1
+        while way[begin] < way[r] - reach[0]:
+            mass -= belief[begin]
+            begin += 1
+        if mass > most:
+            most, best_begin, best_end = mass, begin, end
+    total, centre = 1e-300, 0.0
+    for r in range(best_begin, best_end):
+        total += belief[r]
+        centre += belief[r] * (way[r] - way[best_begin])
+    centre = way[best_begin] + centre / total
+    item = best_begin
+    for r in range(best_begin, best_end):
+        if abs(way[r] - centre) < abs(way[item] - centre):
+            item = r
+    out[0] = most
+    out[1], out[2], top = -1e9, -1e9, 0
+    for r in range(n):
+        if z[r] > z[top]:
+            top = r
+        along, east, north = abs(way[r] - way[item]), xy[r, 0] - xy[item, 0], xy[r, 1] - xy[item, 1]
+        apart = min(along, (east * east + north * north) ** 0.5)
+        if along < reach[1] and z[r] > out[1]:
+            out[1] = z[r]
+        if apart > reach[3] and z[r] > out[2]:
+            out[2] = z[r]
+    east, north = xy[top, 0] - xy[item, 0], xy[top, 1] - xy[item, 1]
+    agrees = min(abs(way[top] - way[item]), (east * east + north * north) ** 0.5) < reach[2]
+    out[3] = 1.0 if agrees else 0.0
+    if out[2] < -1e8:  # the whole map is one place
+        out[2] = -4.0
+    return item

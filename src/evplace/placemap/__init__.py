@@ -18,25 +18,30 @@ from numpy.typing import NDArray
 
 from evplace import places as places_of
 from evplace.core import families
-from evplace.core.errors import EvplaceError, InputError, PartError, PlaceMapError
+from evplace.core.errors import EvplaceError, InputError, PlaceMapError
 from evplace.core.settings import to_dict
 from evplace.core.storage import new_folder, read_array, write_json
 from evplace.drives.to_traverse import open_traverse
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import MARK as TRAVERSE
 from evplace.imaging.traverse import Traverse
+from evplace.matchers import Learned as LearnedByMatcher
+from evplace.matchers import Matcher, Route
 from evplace.placemap._files import (
     FORMAT,
+    TIMES,
     about_of,
     check_sums,
     file_of,
+    files_of,
+    of_matcher,
     read_content,
     write_content,
     write_sums,
 )
 from evplace.placemap._files import MARK as MARK
 from evplace.places import Places
-from evplace.scorers import REFERENCES, Content, Descriptor, Learned, Learning, Scorer, scorer_of, usable
+from evplace.scorers import REFERENCES, Content, Descriptor, Scorer
 from evplace.sources.cleaning import MaskSource
 from evplace.sources.tracks import Track
 
@@ -56,6 +61,8 @@ class Items:
     """(items,) clockwise from north, NaN where unknown or where an item has many."""
     are_places: bool = False
     """Whether there is one item a place, not one a reference image."""
+    t_us: NDArray[np.int64] | None = None
+    """(items,) when each reference image was taken, microseconds; None where that is not kept."""
 
     def __len__(self) -> int:
         return len(self.place)
@@ -84,6 +91,10 @@ class PlaceMap:
     """UTM zone and whether it is northern, of all metres; None without positions."""
     info: dict[str, Any] = field(default_factory=dict)
     """Where it comes from: the source of its drive, how its images were chosen."""
+    matcher: Matcher | None = None
+    """What turns its score rows into answers where nothing else is asked for."""
+    learned: LearnedByMatcher | None = None
+    """What that matcher has learned of the map; None where it learns nothing."""
 
     @property
     def references(self) -> NDArray[np.uint8] | None:
@@ -91,15 +102,21 @@ class PlaceMap:
         images = self.content.get(REFERENCES)
         return images if isinstance(images, np.ndarray) else None
 
+    def route(self, learned: bool = True) -> Route:
+        """What a matcher may know of the items; with what the map's own matcher has learned, or without."""
+        items = self.items
+        return Route(items.position, items.heading_deg, items.t_us, learned=self.learned if learned else None)
+
     @property
     def settings(self) -> dict[str, Any]:
         """How it was made, as plain values: what is saved with every result."""
         return {
-            "scorer": _scorer_to_dict(self.scorer),
+            "scorer": part_to_dict("scorers", self.scorer),
             "recipe": None if self.recipe is None else self.recipe.to_dict(),
             "image_shape": list(self.image_shape),
             "zone": None if self.zone is None else list(self.zone),
             "info": self.info,
+            "matcher": None if self.matcher is None else part_to_dict("matchers", self.matcher),
         }
 
     def open(
@@ -168,24 +185,36 @@ class PlaceMap:
         with new_folder(path, overwrite, MARK) as folder:
             for name, value in self.content.items():
                 write_content(folder, name, value)
+            for name, array in (self.learned or {}).items():
+                np.save(folder / of_matcher(name), array)
             columns = [self.items.place, *self.items.position.T, self.items.heading_deg]
             np.save(folder / "items.npy", np.stack(columns, axis=1).astype(np.float64))
             np.save(folder / "drive.npy", self.drive)
+            if self.items.t_us is not None:
+                np.save(folder / TIMES, self.items.t_us)
             description = {
                 "format": FORMAT,
                 **self.settings,
                 "places": self.places.to_dict(),
                 "items": "places" if self.items.are_places else "images",
                 "content": [file_of(name, value) for name, value in self.content.items()],
+                "learned": sorted(self.learned or {}),
+                "times": self.items.t_us is not None,
             }
             write_json(folder / MARK, description)
             write_sums(folder)
 
     @classmethod
-    def load(cls, path: str | Path, scorer: Scorer | Descriptor | None = None) -> PlaceMap:
+    def load(
+        cls,
+        path: str | Path,
+        scorer: Scorer | Descriptor | None = None,
+        matcher: Matcher | None = None,
+    ) -> PlaceMap:
         """The map in the folder `path`; PlaceMapError where it is none, or a byte of it has changed.
 
-        `scorer` opens a map whose scorer no installed package offers: the object that it was trained with.
+        `scorer` and `matcher` open a map whose parts no installed package offers: the objects that it was
+        trained with.
         """
         folder = Path(path)
         what = f"the map {folder}"
@@ -193,9 +222,9 @@ class PlaceMap:
             raise PlaceMapError(f"{folder} is no map: a map is a folder that `evplace train` has written")
         try:
             about = about_of(folder, what)
-            check_sums(folder, what, {MARK, "items.npy", "drive.npy", *about["content"]})
+            check_sums(folder, what, files_of(about))
             place_map = cls(
-                scorer=_scorer_from(about["scorer"], what) if scorer is None else scorer,
+                scorer=_part_from("scorers", about["scorer"], what) if scorer is None else scorer,
                 places=places_of.from_dict(about["places"]),
                 items=_items(folder, about, what),
                 drive=read_array(folder / "drive.npy", what),
@@ -204,6 +233,9 @@ class PlaceMap:
                 recipe=None if about["recipe"] is None else Recipe.from_dict(about["recipe"]),
                 zone=None if about["zone"] is None else (about["zone"][0], about["zone"][1]),
                 info=about["info"],
+                matcher=_matcher(about, what) if matcher is None else matcher,
+                learned={name: read_array(folder / of_matcher(name), what) for name in about["learned"]}
+                or None,
             )
             _check_fit(place_map, what)
         except PlaceMapError:
@@ -213,107 +245,38 @@ class PlaceMap:
         return place_map
 
 
-def train(
-    reference: Traverse,
-    places: Places,
-    scorer: str | Scorer | Descriptor = "network",
-    preset: str | None = None,
-    learning: Learning | None = None,
-    **settings: object,
-) -> PlaceMap:
-    """Learn the map of `places` from the traverse `reference`.
-
-    `scorer` is a name, with `settings` over those of its `preset`, or an object such as
-    `scorers.NCC(sigma=1)`: network is trained; to ncc and the like the images themselves are the map. Raises
-    SettingsError for an unknown name or setting, TraverseError where no image has a place.
-    """
-    part: Scorer | Descriptor = families.make("scorers", scorer, preset, settings)
-    _, used = usable(reference, places)
-    track = reference.track
-    heading = track.heading_deg if track is not None else np.full(len(reference), np.nan)
-    drive = np.column_stack([reference.xy, heading])
-    with families.blaming("scorers", part):
-        learned = scorer_of(part).learn(reference, places, learning or Learning())
-    _check_learned(learned, len(reference), part)
-    return PlaceMap(
-        part,
-        places,
-        _learned_items(learned, reference, places, drive),
-        drive[used],
-        learned.content,
-        reference.images.shape[1:],
-        reference.recipe,
-        (track.zone, track.northern) if track is not None else None,
-        {key: reference.info[key] for key in ("source", "spacing") if key in reference.info},
-    )
+def remembered(folder: Path) -> str:
+    """The name of the matcher of a map, which is not opened; PlaceMapError where it is none."""
+    about = about_of(folder, f"the map {folder}")
+    if about["matcher"] is not None:
+        return str(about["matcher"]["name"])
+    return "local" if about["items"] == "places" else "bayes"
 
 
-def _check_learned(learned: object, images: int, part: object) -> None:
-    """PartError where a scorer has learned something that no map can hold."""
-    fault = (
-        _fault_of(learned, images) if isinstance(learned, Learned) else f"it gave {type(learned).__name__}"
-    )
-    if fault is not None:
-        raise PartError(
-            f"{families.described('scorers', part)} must learn arrays and bytes, and which images its items "
-            f"are: {fault}"
-        )
-
-
-def _fault_of(learned: Learned, images: int) -> str | None:
-    content: object = learned.content
-    if not isinstance(content, Mapping):
-        return f"its content is {type(content).__name__}"
-    odd = [type(value).__name__ for value in content.values() if not isinstance(value, np.ndarray | bytes)]
-    if odd:
-        return f"its content holds {odd[0]}"
-    if learned.images is not None and not _are_indices(learned.images, images):
-        return f"its items are not some of the {images} images"
-    return None
-
-
-def _are_indices(chosen: object, images: int) -> bool:
-    return (
-        isinstance(chosen, np.ndarray)
-        and chosen.ndim == 1
-        and chosen.dtype.kind in "iu"
-        and bool(np.all((chosen >= 0) & (chosen < images)))
-    )
-
-
-def _learned_items(
-    learned: Learned, reference: Traverse, places: Places, drive: NDArray[np.float64]
-) -> Items:
-    if learned.images is None:
-        return Items(np.arange(places.n), places.centres(), np.full(places.n, np.nan), are_places=True)
-    labels = places.label(places.where(reference.xy))
-    chosen = drive[learned.images]
-    return Items(labels[learned.images], chosen[:, :2], chosen[:, 2])
-
-
-def _scorer_to_dict(scorer: Scorer | Descriptor) -> dict[str, Any]:
+def part_to_dict(family: str, part: object) -> dict[str, Any]:
+    """A scorer or a matcher as plain values, for JSON; `_part_from` makes it anew."""
     return {
-        "name": families.name_of("scorers", scorer),
-        "package": families.package_of(scorer),
-        "settings": to_dict(scorer),
+        "name": families.name_of(family, part),
+        "package": families.package_of(part),
+        "settings": to_dict(part),
     }
 
 
-def _scorer_from(values: Mapping[str, Any], what: str) -> Scorer | Descriptor:
-    name, package = values["name"], values.get("package")
-    if name not in families.names("scorers"):
+def _part_from(family: str, values: Mapping[str, Any], what: str) -> Any:
+    """The part that `part_to_dict` described; PlaceMapError where it is not installed."""
+    name, package, kind = values["name"], values.get("package"), family.removesuffix("s")
+    if name not in families.names(family):
         raise PlaceMapError(
-            f"{what} wants the scorer '{name}' of the package '{package}', which is not installed: install "
-            "it, or hand the scorer in: PlaceMap.load(path, scorer)"
+            f"{what} wants the {kind} '{name}' of the package '{package}', which is not installed: install "
+            f"it, or hand the {kind} in: PlaceMap.load(path, {kind}=...)"
         )
-    found = families.package_of(families.load("scorers", name))
+    found = families.package_of(families.load(family, name))
     if package is not None and found != package:
         raise PlaceMapError(
-            f"{what} wants the scorer '{name}' of the package '{package}', but the one installed is of "
-            f"'{found}': hand the right one in: PlaceMap.load(path, scorer)"
+            f"{what} wants the {kind} '{name}' of the package '{package}', but the one installed is of "
+            f"'{found}': hand the right one in: PlaceMap.load(path, {kind}=...)"
         )
-    part: Scorer | Descriptor = families.make("scorers", name, values=values["settings"])
-    return part
+    return families.make(family, name, values=values["settings"])
 
 
 def _items(folder: Path, about: Mapping[str, Any], what: str) -> Items:
@@ -324,7 +287,17 @@ def _items(folder: Path, about: Mapping[str, Any], what: str) -> Items:
     if not np.all((place >= -1) & (place < MOST_IMAGES) & (place == np.floor(place))):
         raise PlaceMapError(f"{what} is damaged: its items name places that cannot be")
     are_places = about["items"] == "places"
-    return Items(place.astype(np.int64), columns[:, 1:3], columns[:, 3], are_places)
+    times = read_array(folder / TIMES, what) if about["times"] else None
+    if times is not None and (times.dtype != np.int64 or times.shape != place.shape):
+        raise PlaceMapError(f"{what} is damaged: times of {times.dtype} {times.shape} for {len(place)} items")
+    return Items(place.astype(np.int64), columns[:, 1:3], columns[:, 3], are_places, times)
+
+
+def _matcher(about: Mapping[str, Any], what: str) -> Matcher | None:
+    matcher: Matcher | None = (
+        None if about["matcher"] is None else _part_from("matchers", about["matcher"], what)
+    )
+    return matcher
 
 
 def _check_fit(place_map: PlaceMap, what: str) -> None:
@@ -353,3 +326,17 @@ def _check_fit(place_map: PlaceMap, what: str) -> None:
             f"{what} is damaged: references of shape {images.shape} for {len(items)} items of "
             f"{place_map.image_shape}"
         )
+
+
+from evplace.placemap._training import calibrate, default_matcher, default_scorer, train  # noqa: E402 - they make a PlaceMap
+
+__all__ = [
+    "MARK",
+    "Items",
+    "PlaceMap",
+    "calibrate",
+    "default_matcher",
+    "default_scorer",
+    "remembered",
+    "train",
+]

@@ -19,11 +19,15 @@ OLD_FORMAT = "evplace-map-1"
 SUMS = "SHA256SUMS"
 MARK = "map.json"
 """What tells a folder that was written here from any other: only such a one is replaced."""
+TIMES = "times.npy"
+RESERVED = (MARK, "items.npy", "drive.npy", TIMES)
+"""Files that hold no scorer's content."""
 _NAME = re.compile(r"[a-z][a-z0-9_-]*(\.[a-z0-9]+)?")
 """What scorers may call their content."""
 _SHAPE: dict[str, tuple[type, ...]] = {
     "scorer": (dict,), "places": (dict,), "recipe": (dict, type(None)), "image_shape": (list,),
     "zone": (list, type(None)), "info": (dict,), "items": (str,), "content": (list,),
+    "matcher": (dict, type(None)), "learned": (list,), "times": (bool,),
 }  # fmt: skip
 """What map.json holds: a name and the kinds of JSON that it may be."""
 
@@ -32,8 +36,9 @@ def about_of(folder: Path, what: str) -> dict[str, Any]:
     """map.json, each entry of the kind that it must be; of the format before, as of this one."""
     about = read_json(folder / MARK, what)
     if about.get("format") == OLD_FORMAT:
-        about = _of_old_format(about, (folder / "references.npy").exists(), what)
-    elif about.get("format") != FORMAT:
+        about = {"format": FORMAT} | _of_old_format(about, (folder / "references.npy").exists(), what)
+    about = {"matcher": None, "learned": [], "times": False} | about  # maps of before know none of these
+    if about.get("format") != FORMAT:
         raise PlaceMapError(f"{what} has the format {about.get('format')!r}, this version reads {FORMAT}")
     for name, kinds in _SHAPE.items():
         if name not in about or not isinstance(about[name], kinds):
@@ -47,6 +52,7 @@ def about_of(folder: Path, what: str) -> dict[str, Any]:
         raise PlaceMapError(f"{what} is damaged: {zone!r} is no UTM zone")
     if not isinstance(scorer.get("name"), str) or not isinstance(scorer.get("settings"), dict):
         raise PlaceMapError(f"{what} is damaged: its scorer is {scorer!r}")
+    _check_matcher(about, what)
     names = about["content"]
     if not all(isinstance(name, str) and _may_be_called(name) for name in names) or len(set(names)) < len(
         names
@@ -77,6 +83,29 @@ def _of_old_format(about: dict[str, Any], has_references: bool, what: str) -> di
     }
 
 
+def _check_matcher(about: dict[str, Any], what: str) -> None:
+    matcher, learned = about["matcher"], about["learned"]
+    if matcher is not None and not (
+        isinstance(matcher.get("name"), str) and isinstance(matcher.get("settings"), dict)
+    ):
+        raise PlaceMapError(f"{what} is damaged: its matcher is {matcher!r}")
+    if not all(isinstance(name, str) and re.fullmatch("[a-z_]+", name) for name in learned):
+        raise PlaceMapError(f"{what} is damaged: its matcher has learned {learned!r}")
+
+
+def files_of(about: dict[str, Any]) -> set[str]:
+    """All files of a map but its checksums."""
+    learned = {of_matcher(name) for name in about["learned"]}
+    return {MARK, "items.npy", "drive.npy", *about["content"], *learned} | (
+        {TIMES} if about["times"] else set()
+    )
+
+
+def of_matcher(name: str) -> str:
+    """The file of an array that the map's matcher has learned."""
+    return f"matcher-{name}.npy"
+
+
 def file_of(name: str, value: NDArray[Any] | bytes) -> str:
     """The file in which what a scorer has learned lies; PlaceMapError where it cannot be called `name`."""
     file = name if isinstance(value, bytes) else f"{name}.npy"
@@ -86,7 +115,7 @@ def file_of(name: str, value: NDArray[Any] | bytes) -> str:
 
 
 def _may_be_called(file: str) -> bool:
-    return _NAME.fullmatch(file) is not None and file not in (MARK, "items.npy", "drive.npy")
+    return _NAME.fullmatch(file) is not None and file not in RESERVED and not file.startswith("matcher-")
 
 
 def write_content(folder: Path, name: str, value: NDArray[Any] | bytes) -> None:

@@ -17,6 +17,9 @@ from evplace.serving.server import HEADER_S
 class Quiet(uvicorn.Server):
     """Leaves signals to its caller: uvicorn would raise them again once it has ended."""
 
+    should_exit: bool
+    force_exit: bool
+
     @contextlib.contextmanager
     def capture_signals(self) -> Generator[None, None, None]:
         """Nothing."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import io
+import itertools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -15,7 +16,6 @@ import numpy as np
 from evplace.core.errors import EvplaceError, RecordingError
 from evplace.core.events import Events
 from evplace.core.storage import sha256
-from evplace.imaging.stream import event_images
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 from evplace.placemap._files import SUMS
@@ -165,13 +165,10 @@ class Service:
 
 def warm(where: Localizer, size: tuple[int, int]) -> None:
     """Have all that is compiled or loaded at first use ready, without a trace in the drive."""
-    recipe = where.map.recipe
-    if recipe is None or recipe.kind != "events":
-        return
-    events = Events.of([0, 1], [0, 1], [0, 1], [True, False], size)
-    for image, _ in event_images([events], size, recipe):
-        if image.shape == where.map.image_shape:
-            where.matcher.start().step(where.rows(image[None])[0])
+    events = Events.of([0, 1, 40_000], [0, 1, 2], [0, 1, 2], [True, False, True], size)
+    for _ in itertools.chain(where.push(events), where.tick(80_000), where.finish()):
+        pass
+    where.reset()
 
 
 def sensor_of(place_map: PlaceMap, source: Live) -> tuple[int, int]:

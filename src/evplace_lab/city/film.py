@@ -72,6 +72,7 @@ class Film:
         size: Size,
         seed: int,
         length_m: float | None = None,
+        field_deg: float = FIELD_DEG,
     ) -> None:
         """`size` is (width, height); the drive's own draws follow from seed, path and condition."""
         rng = np.random.default_rng([seed, 2, path, list(CONDITIONS).index(weather_name)])
@@ -88,7 +89,7 @@ class Film:
         self._maps = light_maps(town, self.light, self._still + MOVING)
         self._size = size
         width, height = size
-        self._focal = 0.5 * width / math.tan(math.radians(FIELD_DEG) / 2)
+        self._focal = 0.5 * width / math.tan(math.radians(field_deg) / 2)
         self._buffers = Buffers(
             np.empty((2 * height, 2 * width), np.float32),
             np.empty((2 * height, 2 * width), np.int32),
@@ -101,7 +102,10 @@ class Film:
 
     def radiance(self, t_us: int) -> NDArray[np.float32]:
         """(H, W, 3) linear light at a time."""
-        pose = self.drive.pose(t_us)
+        return self.seen_from(self.drive.pose(t_us), t_us)
+
+    def seen_from(self, pose: Pose, t_us: int) -> NDArray[np.float32]:
+        """(H, W, 3) linear light at a time as a camera at any other pose sees it."""
         count = self._populate(pose, t_us)
         self._signals.show(self._scene.look, t_us * 1e-6)
         view = view_of(pose, self._focal, self._size)

@@ -1,10 +1,11 @@
 """The paper's comparison on the benchmark city and on real sets: from recipes to documents.
 
-One file a table or figure; its name is what users ask for. Each holds NEEDS (city or data), INPUTS (those
-that it can be limited to; empty for none), METHODS (those beside which further ones can stand; empty where
-none can), `cases(drives, choice)` (all that must be run), `collect(drives, runs, choice)` (the document, as
-plain values), and `tables(document)` (the same for people). What was run is kept by its settings in the
-output folder, so that a second call, another table or a killed call runs only what is missing.
+One file a table or figure; its name is what users ask for. Each holds NEEDS (city, data or nothing), INPUTS
+(those that it can be limited to; empty for none), METHODS (those beside which further ones can stand; empty
+where none can), `cases(drives, choice)` (all that must be run), `collect(drives, runs, choice)` (the
+document, as plain values), and `tables(document)` (the same for people). What was run is kept by its settings
+in the output folder, so that a second call, another table or a killed call runs only what is missing. One
+that needs nothing holds `document(out, choice, workers, progress)` in place of `cases` and `collect`.
 """
 
 from __future__ import annotations
@@ -84,11 +85,14 @@ def reproduce(
     family = families.load("reproduction", name)
     count = (os.cpu_count() or 1) if workers is None else workers
     _check(name, family, chosen, count)
+    began = time.monotonic()
+    if family.NEEDS == "nothing":
+        with locked(folder / "reproduce"):
+            return _kept(folder / f"{name}.json", family.document(folder, chosen, count, progress), began)
     drives = _real_sets(data) if family.NEEDS == "data" else Cities(Path(city or folder / "city"), folder)
     cases = family.cases(drives, chosen)
     if city is not None or isinstance(drives, RealSets):
         drives.check(cases)
-    began = time.monotonic()
     with locked(folder / "reproduce"):
         if city is None and isinstance(drives, Cities):
             generate(drives.city, workers=count, progress=_of_city(progress))
@@ -99,12 +103,16 @@ def reproduce(
         document |= {
             "settings": {"drives": drives.settings, "seeds": chosen.seeds, "train": chosen.train}
             | ({"methods": to_dict(chosen)["methods"]} if chosen.methods else {}),
-            "versions": versions(),
-            "took_s": round(time.monotonic() - began, 1),
             "cpu_s": round(runs.cpu_s(cases), 1),
         }
-        with new_file(folder / f"{name}.json", overwrite=True) as partial:
-            write_json(partial, document)
+        return _kept(folder / f"{name}.json", document, began)
+
+
+def _kept(file: Path, document: dict[str, Any], began: float) -> dict[str, Any]:
+    """The document with what it was made by and how long it took, which is what the file now holds."""
+    document = document | {"versions": versions(), "took_s": round(time.monotonic() - began, 1)}
+    with new_file(file, overwrite=True) as partial:
+        write_json(partial, document)
     return document
 
 

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
-from torch import Tensor
+from torch import Tensor, nn
 from torch.optim import Optimizer
 
 from evplace.core.storage import new_file
-from evplace.scorers._network.network import Network
 
 EVERY = 100
 """Steps between two saves."""
@@ -33,7 +32,7 @@ class Checkpoint:
         self._path = path
         self._run = run
 
-    def load(self, network: Network, optimiser: Optimizer) -> int:
+    def load(self, network: nn.Module, optimiser: Optimizer) -> int:
         """Restore the saved step of this run and return its number; 0 where there is none."""
         if self._path is None or not self._path.exists():
             return 0
@@ -50,7 +49,7 @@ class Checkpoint:
         optimiser.load_state_dict({**optimiser.state_dict(), "state": _optimiser_state(tensors)})
         return int(metadata["step"])
 
-    def keep(self, step: int, network: Network, optimiser: Optimizer) -> None:
+    def keep(self, step: int, network: nn.Module, optimiser: Optimizer) -> None:
         """Save every `EVERY` steps, replacing the save before."""
         if self._path is None or step % EVERY:
             return

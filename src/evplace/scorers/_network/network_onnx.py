@@ -20,19 +20,21 @@ OPERATORS = frozenset(
     ("BatchNormalization", "Cast", "Conv", "Div", "Flatten", "Gemm", "MaxPool", "Relu", "Softmax")
 )
 """What the graph is made of: a map is an input, and others could run for ever or read files."""
+Port = tuple[str, int, list[str | int]]
+"""What a graph takes or gives: name, type of its numbers, shape."""
 
 
 def onnx_bytes(
     weights: dict[str, NDArray[np.float32]], image: tuple[int, int, int], last_relu: bool
 ) -> bytes:
     """The graph: `images` (n, C, h, w) uint8 -> `scores` (n, N) float32 softmax probabilities."""
-    try:
-        from onnx import TensorProto, checker, helper, numpy_helper
-    except ModuleNotFoundError as error:
-        raise MissingExtraError("onnx", "train", "saving a trained network") from error
-    graph = _Graph(helper)
+    graph = Graph()
+    from onnx import TensorProto
+
+    for name, value in weights.items():
+        graph.constant(name, value)
     x = graph.add("Cast", [INPUT], to=TensorProto.FLOAT)
-    x = graph.add("Div", [x, "full_scale"])
+    x = graph.add("Div", [x, graph.constant("full_scale", np.array(255, np.float32))])
     for layer in ("1", "2", "3"):
         x = graph.add("Conv", [x, f"conv{layer}.weight", f"conv{layer}.bias"], pads=[2, 2, 2, 2])
         x = graph.add("Relu", [x])
@@ -46,23 +48,9 @@ def onnx_bytes(
         if layer != "3" or last_relu:
             x = graph.add("Relu", [x])
     graph.add("Softmax", [x], axis=1, output=OUTPUT)
-    tensors = weights | {"full_scale": np.array(255, np.float32)}
-    n_places = len(weights["full3.bias"])
-    model = helper.make_model(
-        helper.make_graph(
-            graph.nodes,
-            "evplace",
-            [helper.make_tensor_value_info(INPUT, TensorProto.UINT8, ["n", *image])],
-            [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["n", n_places])],
-            [numpy_helper.from_array(value, name) for name, value in tensors.items()],
-        ),
-        opset_imports=[helper.make_opsetid("", OPSET)],
-        ir_version=8,
-        producer_name="evplace",
-    )
-    checker.check_model(model)
-    content: bytes = model.SerializeToString()
-    return content
+    takes: Port = (INPUT, TensorProto.UINT8, ["n", *image])
+    gives: Port = (OUTPUT, TensorProto.FLOAT, ["n", len(weights["full3.bias"])])
+    return graph.model(takes, gives)
 
 
 def check_graph(network: bytes) -> None:
@@ -149,14 +137,42 @@ def _varint(message: memoryview, at: int) -> tuple[int, int]:
     raise IndexError("a number without an end")
 
 
-class _Graph:
-    """Nodes in order, each named after its place in it."""
+class Graph:
+    """Nodes in order, each named after its place in it, and the constants that they take."""
 
-    def __init__(self, helper: Any) -> None:
-        self._helper = helper
-        self.nodes: list[Any] = []
+    def __init__(self) -> None:
+        """MissingExtraError where the package onnx is not installed."""
+        try:
+            from onnx import helper
+        except ModuleNotFoundError as error:
+            raise MissingExtraError("onnx", "train", "saving a trained network") from error
+        self._helper: Any = helper
+        self._nodes: list[Any] = []
+        self._constants: dict[str, NDArray[Any]] = {}
 
     def add(self, kind: str, inputs: list[str], output: str = "", **attributes: object) -> str:
-        output = output or f"{kind.lower()}{len(self.nodes)}"
-        self.nodes.append(self._helper.make_node(kind, inputs, [output], name=output, **attributes))
+        """A node; returns the name of what it gives."""
+        output = output or f"{kind.lower()}{len(self._nodes)}"
+        self._nodes.append(self._helper.make_node(kind, inputs, [output], name=output, **attributes))
         return output
+
+    def constant(self, name: str, value: NDArray[Any]) -> str:
+        """A tensor by its name, which is returned."""
+        self._constants[name] = value
+        return name
+
+    def model(self, takes: Port, gives: Port) -> bytes:
+        """The whole graph, checked."""
+        from onnx import checker, numpy_helper
+
+        ports = [self._helper.make_tensor_value_info(*port) for port in (takes, gives)]
+        tensors = [numpy_helper.from_array(value, name) for name, value in self._constants.items()]
+        model = self._helper.make_model(
+            self._helper.make_graph(self._nodes, "evplace", ports[:1], ports[1:], tensors),
+            opset_imports=[self._helper.make_opsetid("", OPSET)],
+            ir_version=8,
+            producer_name="evplace",
+        )
+        checker.check_model(model)
+        content: bytes = model.SerializeToString()
+        return content

@@ -1,0 +1,60 @@
+"""Measure a map anew: what places that it has never seen score on it.
+
+Examples:
+  evplace calibrate campus.evp                       with the matcher that the map remembers
+  evplace calibrate old.evp --matcher bayes          a map that remembers none yet
+
+`evplace train` does it by itself. The map's own images are localised while stretches of the map are cut out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+
+from evplace.cli._output import note, print_facts, print_json
+from evplace.cli._settings import a_part_of
+from evplace.core import families
+from evplace.placemap import PlaceMap, calibrate
+
+
+@dataclass(frozen=True)
+class Args:
+    """Flags of `evplace calibrate`."""
+
+    map: tyro.conf.Positional[Path]
+    """A map that `evplace train` wrote; what was measured is written into it."""
+    matcher: Annotated[str | None, a_part_of("matchers")] = None
+    """What the map is to be matched with from now on. Default: as it remembers."""
+    json: bool = False
+    """Print one JSON object."""
+
+
+def run(args: Args) -> int:
+    """Measure, save and say."""
+    place_map = PlaceMap.load(args.map)
+    chosen = None if args.matcher is None else families.make("matchers", args.matcher, None, {})
+    measured = calibrate(place_map, chosen)
+    measured.save(args.map, overwrite=True)
+    learned = measured.learned or {}
+    facts: dict[str, object] = {"matcher": families.name_of("matchers", measured.matcher)}
+    for name, values in learned.items():
+        if name.startswith("unknown"):
+            facts |= {
+                f"{name}_images": len(values),
+                f"{name}_threshold": round(float(np.quantile(values, 0.99)), 3),
+            }
+    print_json(facts) if args.json else print_facts(str(args.map), facts)
+    if len(facts) == 1:
+        note(NOT_MEASURED)
+    return 0
+
+
+NOT_MEASURED = (
+    "the map cannot be measured on itself (it is shorter than 150 m, has fewer than 50 images, or its "
+    "matcher learns nothing): matches will have no probability, and none is rejected by it"
+)

@@ -1,0 +1,22 @@
+"""Scores on a scale that means the same on any map: how far above the usual one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def robust_z(row: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+    """(items,) a score row by its median and half its 16 to 84 % range, so that its peak does not count.
+
+    Zero where all scores are alike.
+    """
+    values = np.asarray(row, np.float32)
+    low, middle, high = (int(share * (len(values) - 1)) for share in (0.16, 0.5, 0.84))
+    ordered = np.partition(values, sorted({low, middle, high}))
+    spread = float(ordered[high] - ordered[low]) / 2
+    if spread <= 1e-6 * max(float(np.abs(values).max()), 1e-30):
+        return np.zeros(len(values), np.float32)
+    return np.asarray((values - ordered[middle]) / np.float32(spread), np.float32)

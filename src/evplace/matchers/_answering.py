@@ -1,0 +1,68 @@
+"""From a belief to an answer: which item, how far off it may be, and what else it may be."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.matchers import _route_filter as loops
+from evplace.matchers._belief import reaches
+from evplace.matchers._known import SIGNS, signs_of
+from evplace.matchers._ways import Ways
+
+Floats = NDArray[np.float64]
+
+RIGHT_M = 20.0
+"""An answer so near to the camera, which looks the same way, is right."""
+OTHERS = 5
+"""Runners-up that are named, at most."""
+LIKELY = 0.68
+"""Share of the belief that the uncertainty holds."""
+
+
+class Found(NamedTuple):
+    """The best item by a belief."""
+
+    item: int
+    mass: float
+    """Belief in the stretch around it."""
+    signs: Floats
+    """(SIGNS,) see `_known`."""
+
+
+class Reader:
+    """Reads beliefs over the items of a map."""
+
+    def __init__(self, ways: Ways) -> None:
+        self.ways = ways
+        self._reach = reaches(ways)
+        self._read = np.empty(SIGNS)
+
+    def find(self, belief: Floats, z: NDArray[np.float32]) -> Found:
+        """The item in the middle of the likeliest stretch."""
+        item = loops.read(belief, z, self.ways.way, self.ways.xy, self._reach, self._read)
+        return Found(int(item), float(self._read[0]), signs_of(self._read))
+
+    def uncertainty_m(self, belief: Floats, item: int) -> float:
+        """Radius around the item that holds LIKELY of the belief; NaN where items have no positions."""
+        if not self.ways.in_metres:
+            return float("nan")
+        away, held = self.ways.away(item), np.flatnonzero(belief > 1e-6)
+        order = held[np.argsort(away[held])]
+        share = np.cumsum(belief[order])
+        return float(away[order[np.searchsorted(share, LIKELY * share[-1])]]) if len(order) else float("nan")
+
+    def others(self, belief: Floats, item: int) -> list[tuple[int, float]]:
+        """The next best items at other places, and the belief around each."""
+        left = belief.copy()
+        found: list[tuple[int, float]] = []
+        last = item
+        for _ in range(OTHERS):
+            left[self.ways.away(last) <= self._reach[3]] = 0.0
+            last = int(left.argmax())
+            if left[last] <= 1e-6:
+                break
+            found.append((last, float(left[self.ways.away(last) <= self._reach[0]].sum())))
+        return found

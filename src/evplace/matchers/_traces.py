@@ -1,0 +1,105 @@
+"""A whole drive through the filter: live, or in hindsight, forward and then backward."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core.zscores import robust_z
+from evplace.matchers import Learned, Rows, Seen
+from evplace.matchers._answering import Reader
+from evplace.matchers._belief import WRONG, Clock, Filter, Moment, clock_of, smoothed
+from evplace.matchers._known import SIGNS
+from evplace.matchers._ways import Ways
+
+Floats = NDArray[np.float64]
+BLOCK = 64
+"""Moments whose beliefs are in memory at once; of the others one in so many is, the rest are made again."""
+
+
+class _Drive:
+    """The weights of a drive's images and the moments that they fall into."""
+
+    def __init__(self, seen: Sequence[Seen], clock: Clock) -> None:
+        self.weight = np.zeros(len(seen))
+        self.begins = [0]
+        """The first image of each moment."""
+        self.driven_s = [0.0]
+        """Seconds of driving before each moment."""
+        for query, one in enumerate(seen):
+            self.weight[query], driven_s = clock.see(one)
+            if driven_s is not None and query:
+                self.begins.append(query)
+                self.driven_s.append(driven_s)
+        self.ends = [*self.begins[1:], len(seen)]
+
+
+class Trace(NamedTuple):
+    """What the filter says of each image of a drive."""
+
+    item: NDArray[np.int64]
+    """(queries,) the answers."""
+    signs: Floats
+    """(queries, SIGNS) see `_known`."""
+    weight: Floats
+    """(queries,) how much each image counts."""
+
+
+def live(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
+    """Each answer from the images up to it; `learned` is what the map has told."""
+    filter_, reader, clock = Filter(ways, learned.get(WRONG)), Reader(ways), clock_of(learned)
+    out = Trace(np.zeros(len(rows), np.int64), np.zeros((len(rows), SIGNS)), np.zeros(len(rows)))
+    for query, (row, one) in enumerate(zip(rows, seen, strict=True)):
+        z = robust_z(row)
+        out.weight[query], driven_s = clock.see(one)
+        if driven_s is not None:
+            filter_.move(driven_s)
+        found = reader.find(filter_.see(z, out.weight[query]), z)
+        out.item[query], out.signs[query] = found.item, found.signs
+    return out
+
+
+def late(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
+    """Each answer from all images of the drive."""
+    drive, wrong = _Drive(seen, clock_of(learned)), learned.get(WRONG)
+    out = Trace(np.zeros(len(rows), np.int64), np.zeros((len(rows), SIGNS)), drive.weight)
+    starts = _beliefs_at_blocks(ways, rows, drive, wrong)
+    reader, message = Reader(ways), None
+    for block in range(len(starts) - 1, -1, -1):
+        numbers = range(block * BLOCK, min((block + 1) * BLOCK, len(drive.begins)))
+        moments = _moments(ways, rows, drive, wrong, numbers, starts[block])
+        beliefs, message = smoothed(moments, ways, message)
+        for number, belief in zip(numbers, beliefs, strict=True):
+            for query in range(drive.begins[number], drive.ends[number]):
+                found = reader.find(belief, robust_z(rows[query]))
+                out.item[query], out.signs[query] = found.item, found.signs
+    return out
+
+
+def _beliefs_at_blocks(ways: Ways, rows: Rows, drive: _Drive, wrong: Floats | None) -> list[Floats | None]:
+    """The belief before each block of moments; None before the first."""
+    starts: list[Floats | None] = [None]
+    for first in range(BLOCK, len(drive.begins), BLOCK):
+        numbers = range(first - BLOCK, first)
+        last = _moments(ways, rows, drive, wrong, numbers, starts[-1])[-1]
+        starts.append(last.belief.astype(np.float64))
+    return starts
+
+
+def _moments(
+    ways: Ways, rows: Rows, drive: _Drive, wrong: Floats | None, numbers: range, start: Floats | None
+) -> list[Moment]:
+    """The moments of some numbers, from the belief before them."""
+    filter_, out = Filter(ways, wrong), []
+    if start is not None:
+        filter_.belief = start
+    for number in numbers:
+        if number:
+            filter_.move(drive.driven_s[number])
+        for query in range(drive.begins[number], drive.ends[number]):
+            filter_.see(robust_z(rows[query]), drive.weight[query])
+        out.append(filter_.moment)
+    return out

@@ -1,0 +1,259 @@
+"""Where on the map, and whether on it: a Bayes filter along the route, calibrated on the map itself.
+
+Two layers. The first says where the camera is, if it is on the map: a filter over the references, each with
+a class of speed (Markov localisation: Fox, Burgard and Thrun, JAIR 11, 1999). The second says whether that
+answer is right, from what the answers of the last second looked like (ours). What separates known from
+unknown is measured on the map alone: its own images are localised while stretches of the map are cut out;
+`false_accept` is the share of those never seen that may be accepted.
+
+Answers are live; with `lag_s` each is about the time so many seconds ago, and better; in hindsight all images
+count. Times are in seconds and ways in metres, so that images of any rate give the same answers.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core.errors import SettingsError
+from evplace.core.zscores import robust_z
+from evplace.matchers import (
+    Answer,
+    Estimate,
+    Following,
+    Learned,
+    Matching,
+    Path,
+    Route,
+    Row,
+    Rows,
+    Seen,
+    State,
+    Sweep,
+)
+from evplace.matchers._answering import Found, Reader
+from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
+from evplace.matchers._calibration import LATE, LIVE, measured
+from evplace.matchers._known import LATER, SPANS, Means, features, means_ahead, probability
+from evplace.matchers._rows import RowCheck, above
+from evplace.matchers._traces import late
+from evplace.matchers._ways import Ways
+
+Floats = NDArray[np.float64]
+
+UNDECIDED = 0.1
+"""Below this share of the threshold an answer is no longer lost, but of a place never seen."""
+ALIKE = 0.5
+"""A runner-up with so large a share of the best one's belief makes an answer ambiguous."""
+
+
+@dataclass(frozen=True)
+class Bayes:
+    """The settings; how the camera moves and what scores are worth is not set, but measured."""
+
+    false_accept: float = 0.01
+    """Share of the images of places never seen that may be accepted, as measured on the map itself."""
+    threshold: float | None = None
+    """Accept an answer whose probability is above this, whatever `false_accept` says. Default: by that."""
+    lag_s: float = 0.0
+    """Seconds that an answer waits for what comes next: 0, or from 1 to 60."""
+
+    presets: ClassVar[Mapping[str, Bayes]]
+    causal: ClassVar[bool] = False
+    probabilistic: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        if not 0 < self.false_accept < 1:
+            raise SettingsError(f"'false_accept' is a share between 0 and 1, not {self.false_accept}")
+        if self.lag_s and not 1 <= self.lag_s <= 60:
+            raise SettingsError(f"'lag_s' is 0 or from 1 to 60 seconds, not {self.lag_s}")
+
+    def learn(self, route: Route, rows: Callable[[slice], Rows]) -> Learned:
+        """See RouteMatcher."""
+        return measured(route, rows)
+
+    def follow(self, route: Route, distances: bool = False) -> Following:  # noqa: ARG002 - a distance is -d
+        """See RouteMatcher."""
+        return _Lagging(self, route) if self.lag_s else _Live(self, route)
+
+    def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
+        """See RouteMatcher."""
+        trace = late(Ways.of(route), rows, seen, route.learned or {})
+        right = probability(features(trace.signs, trace.weight, late=True))
+        return Path(trace.item, right, right > self._threshold(route, LATE))
+
+    def start(self, distances: bool = False) -> Matching:  # noqa: ARG002
+        """On rows alone: items a step apart, one query a step."""
+        return _OnRows(self)
+
+    def sweep(self, parameter: str | None = None) -> Sweep:
+        """See Matcher."""
+        usual = parameter in (None, "threshold")
+        return Sweep(parameter or "threshold", self, above if usual else None)
+
+    def _threshold(self, route: Route, kind: str) -> float:
+        """What a probability must be above; where the map could not be measured, any is."""
+        if self.threshold is not None:
+            return self.threshold
+        unknown = (route.learned or {}).get(kind)
+        return -1.0 if unknown is None else float(np.quantile(unknown, 1 - self.false_accept))
+
+
+Bayes.presets = {"best": Bayes()}
+
+
+class _Live:
+    """Answers each image at once, from those before it."""
+
+    def __init__(self, settings: Bayes, route: Route) -> None:
+        learned = route.learned or {}
+        self._threshold, self._measured = settings._threshold(route, LIVE), LIVE in learned
+        self._filter = Filter(Ways.of(route), learned.get(WRONG))
+        self._reader = Reader(self._filter.ways)
+        self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
+
+    def step(self, row: Row, seen: Seen) -> list[Answer]:
+        """See Following."""
+        z = robust_z(self._check(row[None])[0])
+        weight, drive_s = self._clock.see(seen)
+        if drive_s is not None:
+            self._filter.move(drive_s)
+        belief = self._filter.see(z, weight)
+        found = self._reader.find(belief, z)
+        right = float(probability(self._means.add(found.signs, weight).reshape(-1)))
+        return [_answer(self, self._check.queries - 1, belief, found, right, self._clock.standing)]
+
+    def finish(self) -> list[Answer]:
+        """See Following."""
+        return []
+
+
+class _Seen(NamedTuple):
+    query: int
+    t_us: int
+    z: NDArray[np.float32]
+    weight: float
+    standing: bool
+    moment: int
+    """Its number, of all moments so far."""
+
+
+class _Lagging:
+    """Answers each image `lag_s` later, when what came next is known, too."""
+
+    def __init__(self, settings: Bayes, route: Route) -> None:
+        learned = route.learned or {}
+        self._threshold, self._measured = settings._threshold(route, LATE), LATE in learned
+        self._lag_us = round(settings.lag_s * 1e6)
+        self._filter = Filter(Ways.of(route), learned.get(WRONG))
+        self._reader = Reader(self._filter.ways)
+        self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
+        self._waiting: deque[_Seen] = deque()
+        self._moments: deque[Moment] = deque()
+        self._moved = 0
+
+    def step(self, row: Row, seen: Seen) -> list[Answer]:
+        """See Following."""
+        z = robust_z(self._check(row[None])[0])
+        weight, drive_s = self._clock.see(seen)
+        if drive_s is not None:
+            self._moments.append(self._filter.moment)
+            self._filter.move(drive_s)
+            self._moved += 1
+        self._filter.see(z, weight)
+        self._waiting.append(
+            _Seen(self._check.queries - 1, seen.t_us, z, weight, self._clock.standing, self._moved)
+        )
+        return self._answers(sum(one.t_us <= seen.t_us - self._lag_us for one in self._waiting))
+
+    def finish(self) -> list[Answer]:
+        """See Following."""
+        return self._answers(len(self._waiting))
+
+    def _answers(self, due: int) -> list[Answer]:
+        """The first `due` of those that wait, each judged by all that is known."""
+        if not due:
+            return []
+        moments = [*self._moments, self._filter.moment]
+        first = self._moved - len(self._moments)
+        beliefs, _ = smoothed(moments, self._filter.ways)
+        found = [self._reader.find(beliefs[one.moment - first], one.z) for one in self._waiting]
+        weights = np.array([one.weight for one in self._waiting])
+        ahead = means_ahead(np.array([one.signs for one in found]), weights, SPANS[list(LATER)])
+        answers = []
+        for at in range(due):
+            one = self._waiting.popleft()
+            means = np.concatenate([self._means.add(found[at].signs, one.weight), ahead[at]], axis=1)
+            right = float(probability(means.reshape(-1)))
+            belief = beliefs[one.moment - first]
+            answers.append(_answer(self, one.query, belief, found[at], right, one.standing))
+        while self._waiting and self._waiting[0].moment > self._moved - len(self._moments):
+            self._moments.popleft()
+        return answers
+
+
+def _answer(
+    by: _Live | _Lagging, query: int, belief: Floats, found: Found, right: float, standing: bool
+) -> Answer:
+    """The answer, with what it is worth."""
+    accepted = right > by._threshold
+    others = by._reader.others(belief, found.item)
+    estimate = Estimate(
+        _state(right, by._threshold, standing, found.mass, others[0][1] if others else 0.0),
+        right if by._measured else float("nan"),
+        by._reader.uncertainty_m(belief, found.item),
+        tuple(item for item, _ in others),
+    )
+    return Answer(query, found.item, right, accepted, estimate)
+
+
+def _state(right: float, threshold: float, standing: bool, mass: float, runner_up: float) -> State:
+    """What an answer is worth that is right with a probability, its place and the next with their beliefs."""
+    if right > threshold:
+        return "standing" if standing else "localised"
+    if right <= UNDECIDED * threshold:
+        return "unseen"
+    return "ambiguous" if runner_up > ALIKE * mass else "lost"
+
+
+class _OnRows:
+    """Bayes on score rows alone: nothing is known of the map, and queries come at an even pace."""
+
+    def __init__(self, settings: Bayes) -> None:
+        self._settings, self._check = settings, RowCheck()
+        self._rows: list[Rows] = []
+        self._following: Following | None = None
+
+    def step(self, row: Row) -> Answer | None:
+        """See Matching."""
+        row = self._check(row[None])[0]
+        if self._following is None:
+            self._following = self._settings.follow(_nowhere(len(row)))
+        self._rows.append(row[None])
+        answers = self._following.step(row, _on_time(self._check.queries - 1))
+        return answers[0] if answers else None
+
+    def extend(self, rows: Rows) -> None:
+        """See Matching."""
+        self._rows.append(self._check(rows))
+
+    def path(self) -> Path:
+        """See Matching."""
+        if not self._check.queries:
+            return Path.of([])
+        rows = np.concatenate(self._rows)
+        seen = [_on_time(query) for query in range(len(rows))]
+        return self._settings.in_hindsight(_nowhere(rows.shape[1]), rows, seen)
+
+
+def _nowhere(items: int) -> Route:
+    return Route(np.full((items, 2), np.nan), np.full(items, np.nan))
+
+
+def _on_time(query: int) -> Seen:
+    return Seen(query * 1_000_000, 1.0)

@@ -1,0 +1,153 @@
+"""Learn a map: a scorer learns the drive, and the matcher what the map tells of itself."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core import families
+from evplace.core.errors import PartError
+from evplace.imaging.activity import activity
+from evplace.imaging.traverse import Traverse
+from evplace.matchers import Matcher, RouteMatcher, Rows
+from evplace.matchers.bayes import Bayes
+from evplace.matchers.local import Local
+from evplace.placemap import Items, PlaceMap
+from evplace.places import Places
+from evplace.scorers import Descriptor, Learned, Learning, Scorer, scorer_of, usable
+from evplace.scorers.network import Network
+
+
+def train(
+    reference: Traverse,
+    places: Places,
+    scorer: str | Scorer | Descriptor | None = None,
+    preset: str | None = None,
+    learning: Learning | None = None,
+    matcher: str | Matcher | None = None,
+    **settings: object,
+) -> PlaceMap:
+    """Learn the map of `places` from the traverse `reference`.
+
+    Without more it is `fused`, matched by `bayes`: nothing is trained, and no torch is needed. The preset
+    "paper" is the paper's method: the network of Table 1, and Algorithm 1. Else `scorer` is a name, with
+    `settings` over those of its `preset`, or an object such as `scorers.NCC(sigma=1)`: network is trained; to
+    ncc and the like the images themselves are the map. `matcher` is what the map remembers to be matched with
+    (by default bayes, and Algorithm 1 where the items are places); it learns what the map tells of itself.
+    Raises SettingsError for an unknown name or setting, TraverseError where no image has a place.
+    """
+    named = default_scorer(preset) if scorer is None else scorer
+    part: Scorer | Descriptor = families.make("scorers", named, preset, settings)
+    made = _learned(reference, places, part, learning or Learning())
+    if matcher is None:
+        by = preset if preset in Local.presets and made.items.are_places else None
+        return calibrate(made, Local.presets[by] if by else None)
+    return calibrate(made, families.make("matchers", matcher, None, {}))
+
+
+def default_scorer(preset: str | None) -> str:
+    """The scorer where none is named: the one that a preset is of."""
+    return "network" if preset in Network.presets else "fused"
+
+
+def default_matcher(place_map: PlaceMap) -> Matcher:
+    """What a map is matched with that remembers no matcher."""
+    return Local() if place_map.items.are_places else Bayes()
+
+
+def calibrate(place_map: PlaceMap, matcher: Matcher | None = None) -> PlaceMap:
+    """The map with what its matcher, or another one from now on, learns of it from its own images.
+
+    It stays as it is where its items are places, or its matcher learns nothing.
+    """
+    chosen = matcher or place_map.matcher or default_matcher(place_map)
+    place_map = dataclasses.replace(place_map, matcher=chosen, learned=None)
+    images = place_map.references
+    if images is None or not isinstance(chosen, RouteMatcher):
+        return place_map
+    with families.blaming("scorers", place_map.scorer):
+        opened = scorer_of(place_map.scorer).open(place_map.content)
+
+    def rows(items: slice) -> Rows:
+        with families.blaming("scorers", place_map.scorer):
+            return opened.rows(np.asarray(images[items]))
+
+    with families.blaming("matchers", chosen):
+        learned = chosen.learn(place_map.route()._replace(content=_content(place_map, images)), rows)
+    return dataclasses.replace(place_map, learned=learned or None)
+
+
+def _content(place_map: PlaceMap, images: NDArray[np.uint8]) -> float:
+    """What the map's references usually show; NaN of camera images, which no longer follow one another."""
+    of_events = place_map.recipe is not None and place_map.recipe.kind == "events"
+    return float(np.median(activity(images, of_events=True))) if of_events else math.nan
+
+
+def _learned(reference: Traverse, places: Places, part: Scorer | Descriptor, learning: Learning) -> PlaceMap:
+    """The map as its scorer learns it."""
+    _, used = usable(reference, places)
+    track = reference.track
+    heading = track.heading_deg if track is not None else np.full(len(reference), np.nan)
+    drive = np.column_stack([reference.xy, heading])
+    with families.blaming("scorers", part):
+        learned = scorer_of(part).learn(reference, places, learning)
+    _check_learned(learned, len(reference), part)
+    return PlaceMap(
+        part,
+        places,
+        _learned_items(learned, reference, places, drive),
+        drive[used],
+        learned.content,
+        reference.images.shape[1:],
+        reference.recipe,
+        (track.zone, track.northern) if track is not None else None,
+        {key: reference.info[key] for key in ("source", "spacing") if key in reference.info},
+    )
+
+
+def _check_learned(learned: object, images: int, part: object) -> None:
+    """PartError where a scorer has learned something that no map can hold."""
+    fault = (
+        _fault_of(learned, images) if isinstance(learned, Learned) else f"it gave {type(learned).__name__}"
+    )
+    if fault is not None:
+        raise PartError(
+            f"{families.described('scorers', part)} must learn arrays and bytes, and which images its items "
+            f"are: {fault}"
+        )
+
+
+def _fault_of(learned: Learned, images: int) -> str | None:
+    content: object = learned.content
+    if not isinstance(content, Mapping):
+        return f"its content is {type(content).__name__}"
+    odd = [type(value).__name__ for value in content.values() if not isinstance(value, np.ndarray | bytes)]
+    if odd:
+        return f"its content holds {odd[0]}"
+    if learned.images is not None and not _are_indices(learned.images, images):
+        return f"its items are not some of the {images} images"
+    return None
+
+
+def _are_indices(chosen: object, images: int) -> bool:
+    return (
+        isinstance(chosen, np.ndarray)
+        and chosen.ndim == 1
+        and chosen.dtype.kind in "iu"
+        and bool(np.all((chosen >= 0) & (chosen < images)))
+    )
+
+
+def _learned_items(
+    learned: Learned, reference: Traverse, places: Places, drive: NDArray[np.float64]
+) -> Items:
+    if learned.images is None:
+        return Items(np.arange(places.n), places.centres(), np.full(places.n, np.nan), are_places=True)
+    labels = places.label(places.where(reference.xy))
+    chosen = drive[learned.images]
+    times = np.asarray(reference.t_us[learned.images], np.int64)
+    return Items(labels[learned.images], chosen[:, :2], chosen[:, 2], t_us=times)

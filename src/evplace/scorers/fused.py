@@ -1,0 +1,162 @@
+"""The default: edges, which need no training, and the trained descriptor, side by side; each errs elsewhere.
+
+An image is averaged with the one a tenth of a second before it, and the map keeps a reference a metre. What
+each part scores becomes z-scores, so that both count alike whatever their scale, and these are added.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evplace.core.errors import PlaceMapError, SettingsError
+from evplace.core.zscores import robust_z
+from evplace.imaging.activity import activity
+from evplace.imaging.averaging import Averaging, averaged
+from evplace.imaging.spacing import Spacer, SpacingSettings
+from evplace.imaging.traverse import Traverse
+from evplace.places import Places
+from evplace.scorers import (
+    REFERENCES,
+    Content,
+    Descriptor,
+    Learned,
+    Learning,
+    OpenScorer,
+    Rows,
+    references_of,
+    usable,
+)
+from evplace.scorers._compressed import Compressed, compress
+from evplace.scorers.edges import Edges
+from evplace.scorers.trained import Trained
+
+VERSIONS = "descriptors.json"
+"""Content of a map: which descriptors made its vectors."""
+EDGES_VERSION = "1"
+"""Vectors of another version of `Edges` cannot be compared with these."""
+STANDING = 0.5
+"""Without positions, images that show less than this share of the usual are left out: the camera stood."""
+BLOCK = 64
+"""Images described at once."""
+
+
+@dataclass(frozen=True)
+class Fused:
+    """How a map is made; scores are robust z-scores: the usual reference has 0."""
+
+    every_m: float = 1.0
+    """Metres between two references; 0 keeps all images."""
+    averaging: Averaging = field(default_factory=Averaging)
+    """How an image is averaged with those before it."""
+    trained: bool = True
+    """Whether the trained descriptor takes part; False leaves the edges alone."""
+    components: int = 384
+    """Numbers that are kept of each vector."""
+
+    presets: ClassVar[Mapping[str, Fused]]
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.every_m < 1e6 or self.components < 1:
+            raise SettingsError("the settings of fused need every_m of 0 or more, components of 1 or more")
+
+    @property
+    def parts(self) -> dict[str, Descriptor]:
+        """The descriptors by their names."""
+        return {"edges": Edges()} | ({"trained": Trained()} if self.trained else {})
+
+    def learn(self, reference: Traverse, places: Places, _: Learning) -> Learned:
+        """See Scorer."""
+        kept = _kept(reference, places, self.every_m)
+        filled = np.flatnonzero(reference.counts != 0)
+        means = averaged(reference.images[filled], reference.t_us[filled], self.averaging)
+        references = means[np.searchsorted(filled, kept)]
+        content: dict[str, NDArray[np.float32] | NDArray[np.uint8] | bytes] = {REFERENCES: references}
+        for name, part in self.parts.items():
+            found = compress(_described(part, references), self.components)
+            content |= {f"{name}_basis": found.basis, f"{name}_vectors": found.vectors}
+        content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
+        return Learned(content, kept)
+
+    def open(self, content: Content) -> OpenScorer:
+        """See Scorer."""
+        items = len(references_of(content))
+        _check_versions(content, _versions(self))
+        return _FusedRows([(part, _read(content, name, items)) for name, part in self.parts.items()])
+
+
+Fused.presets = {"best": Fused()}
+
+
+class _FusedRows:
+    distances = False
+
+    def __init__(self, parts: list[tuple[Descriptor, Compressed]]) -> None:
+        self._parts = parts
+
+    def rows(self, images: NDArray[np.uint8]) -> Rows:
+        return np.concatenate([self._row(images[at : at + 1]) for at in range(len(images))])
+
+    def _row(self, image: NDArray[np.uint8]) -> Rows:
+        """(1, items): image by image, so that a row does not depend on what else is asked."""
+        scores = [robust_z(searched.rows(part.describe(image))[0]) for part, searched in self._parts]
+        return robust_z(np.sum(scores, axis=0))[None]
+
+
+def _kept(reference: Traverse, places: Places, every_m: float) -> NDArray[np.int64]:
+    """(items,) the images that become references: one every so many metres, or of a camera that moved."""
+    _, used = usable(reference, places)
+    if not every_m:
+        return np.flatnonzero(used)
+    if np.isfinite(reference.xy[used]).all():
+        spacer = Spacer(SpacingSettings(every_m=every_m), reference.track)
+        chosen = np.flatnonzero(used).tolist()
+        return np.array([at for at in chosen if spacer.keeps(int(reference.t_us[at]), -1)], np.int64)
+    shown = activity(reference.images, of_events=bool((reference.counts >= 0).any()))
+    return np.flatnonzero(used & ~(shown < STANDING * np.nanmedian(shown[used])))
+
+
+def _described(part: Descriptor, images: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """(n, dimensions), a block of images at a time."""
+    return np.concatenate([part.describe(images[at : at + BLOCK]) for at in range(0, len(images), BLOCK)])
+
+
+def _versions(settings: Fused) -> dict[str, str]:
+    return {"edges": EDGES_VERSION} | ({"trained": Trained().version} if settings.trained else {})
+
+
+def _check_versions(content: Content, wanted: dict[str, str]) -> None:
+    """PlaceMapError where a map's vectors are of other descriptors than these."""
+    text = content.get(VERSIONS)
+    try:
+        found = json.loads(text) if isinstance(text, bytes) else None
+    except ValueError:
+        found = None
+    if not isinstance(found, dict):
+        raise PlaceMapError(f"the map does not say which descriptors made it ({VERSIONS}): train it again")
+    for name, version in wanted.items():
+        if found.get(name) != version:
+            raise PlaceMapError(
+                f"the map was made by version {str(found.get(name))[:12]} of the descriptor '{name}', this "
+                f"is version {version[:12]}: train it again, or use the evplace that it was made with"
+            )
+
+
+def _read(content: Content, name: str, items: int) -> Compressed:
+    """The vectors of one part; PlaceMapError where they do not fit the map."""
+    basis, vectors = content.get(f"{name}_basis"), content.get(f"{name}_vectors")
+    for array in (basis, vectors):
+        good = isinstance(array, np.ndarray) and array.dtype == np.float32 and array.ndim == 2
+        if not good or not np.isfinite(np.asarray(array)).all():
+            raise PlaceMapError(f"the map's vectors of '{name}' are missing or damaged: train it again")
+    basis, vectors = np.asarray(basis), np.asarray(vectors)
+    if len(vectors) != items or basis.shape[1] != vectors.shape[1]:
+        raise PlaceMapError(
+            f"the map holds vectors of '{name}' of shape {vectors.shape} by {basis.shape} for {items} items"
+        )
+    return Compressed(basis, vectors)
