@@ -70,11 +70,12 @@ def serving(
     source: Live,
     token: str | None = None,
     host: str = "127.0.0.1",
+    at_port: int = 0,
     **more: Any,
 ) -> Iterator[Served]:
     """A service for the map that lies at `path`, on a thread of its own."""
     service = Service(Localizer(place_map, more.pop("matcher", "best")), source, path, "made", **more)
-    listening = bound(host, 0, token)
+    listening = bound(host, at_port, token)
     port = listening.getsockname()[1]
     stops: list[Stop] = []
     ready = threading.Event()

@@ -78,7 +78,7 @@ function say(m) {
   for (const tile of document.querySelectorAll("[data-warn]")) tile.classList.toggle("warn", m[tile.dataset.warn] > 0);
 }
 
-let spokenAt = 0;
+let spokenAt = -Infinity;
 let spoken = "";
 function speak(m) {
   const now = performance.now();
