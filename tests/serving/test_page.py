@@ -22,7 +22,10 @@ from served import Served, serving
 
 SHOWN = """(() => {
   const canvas = document.getElementById("now");
-  const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  const copy = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+  Object.assign(copy.canvas, { width: canvas.width, height: canvas.height });
+  copy.drawImage(canvas, 0, 0);
+  const data = copy.getImageData(0, 0, canvas.width, canvas.height).data;
   let sum = 0;
   for (let at = 0; at < data.length; at += 4) sum = (sum * 31 + data[at]) % 1000003;
   return sum;

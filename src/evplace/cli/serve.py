@@ -16,7 +16,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import sys
 import threading
+import webbrowser
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,6 +96,8 @@ class Args(SettingsFlags):
     """Also publish ROS 2 topics under this name, over zenoh: NAME/fix, NAME/pose and /diagnostics."""
     zenoh_router: str = ""
     """The zenoh router for that: tcp/192.168.1.5:7447; the one on this machine where it is empty."""
+    open: bool = False
+    """Open the page in a browser, where there is a screen."""
     stop_at_end: bool = False
     """End with the source, instead of showing its last answer."""
 
@@ -144,6 +148,8 @@ async def _serve(args: Args, service: Service, listening: Any, token: str | None
     def ready(stop: Stop) -> None:
         query = f"?token={token}" if token and args.token else ""
         note(f"{args.source} is localised in {args.map}: open {address}{query}; Ctrl-C ends it")
+        if args.open and _has_screen():
+            webbrowser.open(address + query)
         if args.stop_at_end:
             threading.Thread(target=_end_with, args=(service, stop), daemon=True).start()
 
@@ -153,6 +159,11 @@ async def _serve(args: Args, service: Service, listening: Any, token: str | None
 def _end_with(service: Service, stop: Stop) -> None:
     service.drive.ended.wait()
     stop()
+
+
+def _has_screen() -> bool:
+    """Whether a browser would open a window: in a terminal it would take that over."""
+    return sys.platform in ("win32", "darwin") or bool({"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ))
 
 
 def _say_end(service: Service) -> None:
