@@ -36,7 +36,7 @@ class Driven:
     """A drive and its reports."""
 
     def __init__(
-        self, place_map: PlaceMap, source: Live, matcher: str = "best", hold: int = 8_000_000
+        self, place_map: PlaceMap, source: Live, matcher: str = "best", hold: int = 4_000_000
     ) -> None:
         self.reports: list[Report] = []
         self.feed = Feed(source, SIZE, hold=hold)
