@@ -33,9 +33,9 @@ from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
-from evplace.serving.drive import Drive
-from evplace.serving.feed import Feed
-from evplace.serving.report import Report
+from evplace.serving._drive import Drive
+from evplace.serving._feed import Feed
+from evplace.serving._report import Report
 from evplace.serving.service import Service, warm
 from evplace.sources.live import Item
 from evplace.sources.readers import Block
@@ -128,8 +128,9 @@ def latency(place_map: PlaceMap, windows: int) -> None:
             assert len(found) == 1
             list(where.push(events[edge + 1 :]))
     ms = 1000 * np.array(taken[10:])
+    name = place_map.settings["scorer"]["name"]
     print(
-        f"window's end to match by {where.map.settings['scorer']['name']}, {len(ms)} windows of {RATE // 30:,} events, map of {MAP} images: "
+        f"window's end to match by {name}, {len(ms)} windows of {RATE // 30:,} events, map of {MAP} images: "
         f"p50 {np.quantile(ms, 0.5):.2f} ms, p99 {np.quantile(ms, 0.99):.2f} ms of CPU ({load()})"
     )
 

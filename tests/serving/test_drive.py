@@ -20,9 +20,9 @@ from conftest import HANG_S, Drive, make_drive
 from evplace.core.events import Events
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
-from evplace.serving.drive import Drive as LiveDrive
-from evplace.serving.feed import Feed
-from evplace.serving.report import Describer, Report
+from evplace.serving._drive import Drive as LiveDrive
+from evplace.serving._feed import Feed
+from evplace.serving._report import Describer, Report
 from evplace.sources.live import ANEW, Live, open_live
 from evplace.sources.live.stdin import Piped
 from evplace.sources.live.udp import Listening

@@ -15,9 +15,9 @@ from made_sources import Made, block
 from conftest import HANG_S, make_drive
 from evplace.core.errors import OutputError, RecordingError
 from evplace.core.events import Events
-from evplace.serving.clock import LEAP_US, Sieve
-from evplace.serving.feed import PACKET, Feed, Packet
-from evplace.serving.recorder import Recorder
+from evplace.serving._clock import LEAP_US, Sieve
+from evplace.serving._feed import PACKET, Feed, Packet
+from evplace.serving._recorder import Recorder
 from evplace.sources.live import ANEW
 from evplace.sources.readers import Block, open_recording
 

@@ -18,10 +18,10 @@ from conftest import HANG_S
 from evplace.core.errors import OutputError
 from evplace.localizer import Match
 from evplace.placemap import PlaceMap
-from evplace.serving.feed import Counters
+from evplace.serving._feed import Counters
+from evplace.serving._report import Report, epsg
 from evplace.serving.nmea import sentence, sentences
 from evplace.serving.outputs import Output
-from evplace.serving.report import Report, epsg
 from evplace.serving.ros import (
     TYPES,
     diagnosis_of,

@@ -282,7 +282,7 @@ def test_one_who_never_reads_holds_up_nobody(fed: Fed, monkeypatch: pytest.Monke
 def test_a_listener_that_takes_nothing_has_a_bounded_queue() -> None:
     import asyncio
 
-    from evplace.serving.hub import WAITING, Listener
+    from evplace.serving._hub import WAITING, Listener
 
     listener = Listener()
     for number in range(1000):
@@ -294,7 +294,7 @@ def test_a_listener_that_takes_nothing_has_a_bounded_queue() -> None:
 def test_too_many_listeners_are_sent_away(fed: Fed, monkeypatch: pytest.MonkeyPatch) -> None:
     from websockets.exceptions import InvalidStatus
 
-    monkeypatch.setattr("evplace.serving.web.LISTENERS", 1)
+    monkeypatch.setattr("evplace.serving._web.LISTENERS", 1)
     with fed.served.listen():
         fed.served.until(lambda: fed.served.json("/state")["clients"] == 1)
         with pytest.raises(InvalidStatus), fed.served.listen():

@@ -26,9 +26,8 @@ from sensor_msgs.msg import NavSatFix
 from evplace.core.errors import EvplaceError
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
-from evplace.serving.report import Report
 from evplace.serving.ros import diagnosis_of, fix_of, pose_of
-from evplace.serving.service import Service
+from evplace.serving.service import Report, Service
 from evplace.sources.live import WAIT_S, Item
 from evplace.sources.readers._ros_encodings import ENCODINGS
 

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 
 from evplace.localizer import Match
 from evplace.placemap import PlaceMap
-from evplace.serving.report import Report
+from evplace.serving._report import Report
 
 TALKER = "GP"
 """Programs that know but one talker know this one."""

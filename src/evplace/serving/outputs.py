@@ -14,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from evplace.core.errors import OutputError
-from evplace.serving.report import Report
+from evplace.serving._report import Report
 from evplace.sources.live.udp import host_and_port
 
 WAITING = 256

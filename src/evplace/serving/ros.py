@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from evplace.localizer import Match
 from evplace.placemap import PlaceMap
-from evplace.serving.report import Report, epsg
+from evplace.serving._report import Report, epsg
 from evplace.sources.live.zenoh import GID, attachment, session
 
 SURE = ("localised", "standing")

@@ -13,7 +13,7 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 from evplace.core.errors import MissingExtraError, OutputError, SettingsError
-from evplace.serving.guard import Guard
+from evplace.serving._guard import Guard
 from evplace.serving.service import Service
 
 CONNECTIONS = 256
@@ -77,7 +77,7 @@ async def serve(
     import uvicorn
 
     from evplace.serving._connections import Patient, Quiet
-    from evplace.serving.web import application
+    from evplace.serving._web import application
 
     loop = asyncio.get_running_loop()
     service.start(loop)

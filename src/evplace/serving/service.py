@@ -19,11 +19,11 @@ from evplace.core.storage import sha256
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 from evplace.placemap._files import SUMS
-from evplace.serving.drive import Drive
-from evplace.serving.feed import Feed
-from evplace.serving.hub import Hub, grey
-from evplace.serving.recorder import Recorder
-from evplace.serving.report import Describer, Report, counted, epsg
+from evplace.serving._drive import Drive
+from evplace.serving._feed import Feed
+from evplace.serving._hub import Hub, grey
+from evplace.serving._recorder import Recorder
+from evplace.serving._report import Describer, Report, counted, epsg
 from evplace.sources.live import Facts, Live
 from evplace.sources.live.replay import Replaying
 

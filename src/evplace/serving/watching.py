@@ -8,7 +8,7 @@ from pathlib import Path
 
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
-from evplace.serving.report import Report
+from evplace.serving._report import Report
 from evplace.serving.service import Service
 from evplace.sources.live import Live
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from evplace.serving.hub import Hub
+from evplace.serving._hub import Hub
 from evplace.serving.service import Service
 
 STATES = ("localised", "ambiguous", "unseen", "lost", "standing", "no-events")

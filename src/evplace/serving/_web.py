@@ -17,8 +17,8 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from evplace.core.errors import EvplaceError
-from evplace.serving.hub import Hub, Picture
-from evplace.serving.metrics import prometheus
+from evplace.serving._hub import Hub, Picture
+from evplace.serving._metrics import prometheus
 from evplace.serving.service import Service
 
 PAGE = Path(__file__).parent / "page"

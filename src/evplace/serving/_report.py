@@ -9,7 +9,7 @@ from typing import Any
 
 from evplace.localizer import Match
 from evplace.placemap import PlaceMap
-from evplace.serving.feed import Counters
+from evplace.serving._feed import Counters
 
 RUNNERS_UP = 5
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.serving.report import Describer, Report
+from evplace.serving._report import Describer, Report
 
 WAITING = 64
 """Messages that wait for one listener at most: two seconds of matches."""

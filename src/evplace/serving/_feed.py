@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from evplace.core.errors import EvplaceError
 from evplace.core.events import Events, Size
-from evplace.serving.clock import Sieve
-from evplace.serving.recorder import Recorder
+from evplace.serving._clock import Sieve
+from evplace.serving._recorder import Recorder
 from evplace.sources.live import Facts, Live
 from evplace.sources.readers import Block
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from evplace.core.errors import EvplaceError
 from evplace.localizer import Localizer, Match
-from evplace.serving.feed import Feed, Packet
-from evplace.serving.report import Report
+from evplace.serving._feed import Feed, Packet
+from evplace.serving._report import Report
 
 GRACE_S = 0.15
 """Seconds that events may be late by."""
