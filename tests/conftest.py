@@ -136,4 +136,4 @@ def sum_again(folder: Path) -> None:
 def network_map(day: Traverse, places: PlaceGrid) -> PlaceMap:
     """A map with a network that was trained for a moment."""
     pytest.importorskip("torch", reason="the network needs the extra 'train'")
-    return train(day, places, steps=120, batch=16)
+    return train(day, places, "network", steps=120, batch=16)

@@ -100,7 +100,7 @@ def test_samples_come_from_the_map_or_from_its_drive(
 
 def test_samples_of_runs_show_the_middle_of_each(day: Traverse) -> None:
     drive = dataclasses.replace(day, track=None)
-    place_map = train(drive, PlaceRuns(len(day), every=10), steps=2, batch=8)
+    place_map = train(drive, PlaceRuns(len(day), every=10), "network", steps=2, batch=8)
     result = evaluate(Localizer(place_map, "best"), drive, reference=drive)
     assert result.samples is not None
     assert result.true_item is not None

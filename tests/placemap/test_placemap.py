@@ -69,7 +69,7 @@ def test_scorers_and_their_settings_are_checked(day: Traverse, places: PlaceGrid
     assert train(day, places, "ncc", sigma=1).scorer == scorers.NCC(sigma=1.0)
     with pytest.raises(SettingsError, match="did you mean 'sigma'"):
         train(day, places, "ncc", sigmas=1)
-    with pytest.raises(SettingsError, match="known are cosine, ncc, network"):
+    with pytest.raises(SettingsError, match="known are cosine, edges, fused, ncc, network"):
         train(day, places, "nearest")
     with pytest.raises(SettingsError, match="put them into the object"):
         train(day, places, scorers.NCC(), sigma=1)

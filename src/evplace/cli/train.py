@@ -140,6 +140,8 @@ def _scorer(args: Args) -> Scorer | Descriptor:
         return make(TrainSettings, dict(args.set), args.train)
     trained = [name for name in vars(args.train) if name in args.given]
     if trained:
-        raise SettingsError(f"`{trained[0]}` means nothing for the scorer '{name}': leave it out")
+        raise SettingsError(
+            f"`{trained[0]}` means nothing for the scorer '{name}': leave it out, or add --scorer network"
+        )
     part: Scorer | Descriptor = families.make("scorers", name, args.preset, dict(args.set))
     return part

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -48,11 +49,11 @@ class Reader:
     def uncertainty_m(self, belief: Floats, item: int) -> float:
         """Radius around the item that holds LIKELY of the belief; NaN where items have no positions."""
         if not self.ways.in_metres:
-            return float("nan")
+            return math.nan
         away, held = self.ways.away(item), np.flatnonzero(belief > 1e-6)
         order = held[np.argsort(away[held])]
         share = np.cumsum(belief[order])
-        return float(away[order[np.searchsorted(share, LIKELY * share[-1])]]) if len(order) else float("nan")
+        return float(away[order[np.searchsorted(share, LIKELY * share[-1])]]) if len(order) else math.nan
 
     def others(self, belief: Floats, item: int) -> list[tuple[int, float]]:
         """The next best items at other places, and the belief around each."""

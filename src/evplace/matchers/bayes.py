@@ -12,6 +12,7 @@ count. Times are in seconds and ways in metres, so that images of any rate give 
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -205,7 +206,7 @@ def _answer(
     others = by._reader.others(belief, found.item)
     estimate = Estimate(
         _state(right, by._threshold, standing, found.mass, others[0][1] if others else 0.0),
-        right if by._measured else float("nan"),
+        right if by._measured else math.nan,
         by._reader.uncertainty_m(belief, found.item),
         tuple(item for item, _ in others),
     )

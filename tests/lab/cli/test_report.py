@@ -59,7 +59,23 @@ def test_the_reference_drive_lends_a_networks_map_its_images(results: Path, tmp_
     day = [f"{folder}/day.aedat4", "--track", f"{folder}/day.csv"]
     night = [f"{folder}/night.aedat4", "--track", f"{folder}/night.csv"]
     assert main(["images", *day, "-o", f"{tmp_path}/day"]) == 0
-    assert main(["train", *day, "-o", f"{tmp_path}/net.evp", "--steps", "2", "--batch", "8"]) == 0
+    assert (
+        main(
+            [
+                "train",
+                *day,
+                "-o",
+                f"{tmp_path}/net.evp",
+                "--scorer",
+                "network",
+                "--steps",
+                "2",
+                "--batch",
+                "8",
+            ]
+        )
+        == 0
+    )
     command = ["evaluate", f"{tmp_path}/net.evp", *night, "-o", f"{tmp_path}/r"]
     assert main([*command, "--reference", f"{tmp_path}/day"]) == 0
     assert (tmp_path / "r" / "samples.npy").exists()

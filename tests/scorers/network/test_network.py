@@ -79,7 +79,7 @@ def test_training_learns_the_drive(network_map: PlaceMap, day: Traverse, places:
 
 
 def test_a_seed_gives_the_same_weights(day: Traverse, places: PlaceGrid) -> None:
-    first, second, other = (train(day, places, steps=3, batch=8, seed=seed) for seed in (5, 5, 6))
+    first, second, other = (train(day, places, "network", steps=3, batch=8, seed=seed) for seed in (5, 5, 6))
     assert first.content == second.content
     assert first.content != other.content
 
@@ -88,7 +88,7 @@ def test_a_killed_run_goes_on_to_the_same_weights(
     day: Traverse, places: PlaceGrid, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(checkpoint, "EVERY", 2)
-    whole = train(day, places, steps=7, batch=8, dropout=0.2)
+    whole = train(day, places, "network", steps=7, batch=8, dropout=0.2)
     file = tmp_path / "run.checkpoint"
 
     def kill(step: int, steps: int, loss: float) -> None:
@@ -96,10 +96,10 @@ def test_a_killed_run_goes_on_to_the_same_weights(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(day, places, steps=7, batch=8, dropout=0.2, learning=Learning(kill, file))
+        train(day, places, "network", steps=7, batch=8, dropout=0.2, learning=Learning(kill, file))
     steps_left: list[int] = []
     learning = Learning(lambda step, steps, loss: steps_left.append(step), file)
-    resumed = train(day, places, steps=7, batch=8, dropout=0.2, learning=learning)
+    resumed = train(day, places, "network", steps=7, batch=8, dropout=0.2, learning=learning)
     assert steps_left == [5, 6, 7]
     assert resumed.content == whole.content
     assert not file.exists()
@@ -108,8 +108,8 @@ def test_a_killed_run_goes_on_to_the_same_weights(
 def test_a_checkpoint_of_another_run_is_passed_over(day: Traverse, places: PlaceGrid, tmp_path: Path) -> None:
     file = tmp_path / "run.checkpoint"
     file.write_bytes(b"cut")
-    after_all = train(day, places, steps=2, batch=8, learning=Learning(checkpoint=file))
-    assert after_all.content[GRAPH] == train(day, places, steps=2, batch=8).content[GRAPH]
+    after_all = train(day, places, "network", steps=2, batch=8, learning=Learning(checkpoint=file))
+    assert after_all.content[GRAPH] == train(day, places, "network", steps=2, batch=8).content[GRAPH]
 
 
 def test_batches_are_shuffled_passes() -> None:
@@ -152,7 +152,7 @@ def test_settings_that_cannot_be_are_refused(wrong: dict[str, object]) -> None:
 def test_no_image_with_a_place_is_an_error(day: Traverse, places: PlaceGrid) -> None:
     lost = Traverse(day.images, day.t_us, day.counts, None, day.recipe)
     with pytest.raises(TraverseError, match="no image of the traverse has a place"):
-        train(lost, places, steps=1)
+        train(lost, places, "network", steps=1)
 
 
 def test_small_images_are_refused() -> None:
@@ -170,7 +170,7 @@ def test_small_images_are_refused() -> None:
 def test_one_place_only_is_learned(day: Traverse) -> None:
     assert day.track is not None
     one = PlaceGrid.from_track(day.track, cell_m=1e6)
-    learned = train(day, one, steps=1, batch=4)
+    learned = train(day, one, "network", steps=1, batch=4)
     assert Localizer(learned).rows(day.images[:2]).tolist() == [[1.0], [1.0]]
 
 
