@@ -351,10 +351,10 @@ def main() -> None:
     parser.add_argument("--city", type=Path)
     args = parser.parse_args()
     place_map = made_map()
-    for one in (place_map, made_map("edges"), made_map("ncc")):
-        latency(one, args.windows)
     sustained(place_map, args.seconds)
     overload(place_map, min(args.seconds / 4, 10.0))
+    for one in (place_map, made_map("edges"), made_map("ncc")):
+        latency(one, args.windows)
     if args.city is not None:
         day = Traverse.load(args.city / "day-1" / "ideal")
         assert day.track is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 import json
 import os
@@ -228,4 +229,7 @@ def test_reports_carry_both_clocks_and_the_counters(
     assert (values["item"], values["place"]) == (report.match.item, report.match.place)
     assert {"backlog", "skipped", "overflows", "recorded", "latency_ms", "rate", "epsg"} <= set(values)
     assert values["probability"] is None
+    assert values["last"]["place"] == report.match.place
+    gone = dataclasses.replace(report, match=Match(7, -1, -1, None, float("nan"), "no-events"))
+    assert describe.values(gone)["last"] == values["last"]
     assert np.isfinite(values["latency_ms"])

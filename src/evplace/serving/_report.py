@@ -12,6 +12,8 @@ from evplace.placemap import PlaceMap
 from evplace.serving._feed import Counters
 
 RUNNERS_UP = 5
+SURE = ("localised", "standing")
+"""States in which the position is the camera's."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +37,12 @@ class Describer:
 
     def __init__(self, place_map: PlaceMap, sha256: str) -> None:
         self._map, self._sha256 = place_map, sha256
+        self._last: dict[str, Any] | None = None
 
     def values(self, report: Report) -> dict[str, Any]:
         """The report as JSON has it; null where something is unknown."""
         match = report.match
+        self._last = self._stood_by(match) or self._last
         return {
             "t_us": match.t_us,
             "host_s": round(report.host_s, 6),
@@ -50,6 +54,7 @@ class Describer:
             "uncertainty_m": _number(match.uncertainty_m, 2),
             "probability": _number(match.probability, 4),
             "score": _number(match.score, 6),
+            "last": self._last,
             "others": [self._other(item) for item in match.others[:RUNNERS_UP]],
             "map_sha256": self._sha256,
             "latency_ms": _number(1000 * report.latency_s, 2),
@@ -61,6 +66,12 @@ class Describer:
     def text(self, values: dict[str, Any]) -> str:
         """Values as one line of JSON."""
         return json.dumps(values, allow_nan=False)
+
+    def _stood_by(self, match: Match) -> dict[str, Any] | None:
+        """Where the camera was, if that is stood by: it holds while nothing else is known."""
+        if match.state not in SURE:
+            return None
+        return {"t_us": match.t_us, "place": _known(match.place), **self._position(match.position)}
 
     def _position(self, position: tuple[float, float] | None) -> dict[str, Any]:
         """Easting and northing with their EPSG code, and latitude and longitude where the map has a zone."""

@@ -12,12 +12,10 @@ from datetime import UTC, datetime
 
 from evplace.localizer import Match
 from evplace.placemap import PlaceMap
-from evplace.serving._report import Report
+from evplace.serving._report import SURE, Report
 
 TALKER = "GP"
 """Programs that know but one talker know this one."""
-SURE = ("localised", "standing")
-"""States in which the position is the camera's."""
 METRES_PER_HDOP = 5.0
 """Usual size of a receiver's error that its dilution of precision multiplies."""
 

@@ -15,11 +15,9 @@ from typing import Any, NamedTuple
 
 from evplace.localizer import Match
 from evplace.placemap import PlaceMap
-from evplace.serving._report import Report, epsg
+from evplace.serving._report import SURE, Report, epsg
 from evplace.sources.live.zenoh import GID, attachment, session
 
-SURE = ("localised", "standing")
-"""States in which the position is the camera's."""
 UNKNOWN_M = 1000.0
 """Uncertainty that stands for one that is not known."""
 SIGMAS = 1.515

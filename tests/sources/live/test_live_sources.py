@@ -25,9 +25,11 @@ from evplace.sources.live import ANEW, Facts, Item, Live, address, open_live, so
 from evplace.sources.live._bytes import ByteStream
 from evplace.sources.live.replay import Replay, Replaying
 from evplace.sources.live.stdin import Piped
+from evplace.sources.live.tail import Tail
 from evplace.sources.live.udp import UDP, Listening
 from evplace.sources.readers import Block, open_recording
 from evplace.sources.writers import write_recording
+from evplace.testing import check_live
 from made_streams import faery_datagrams, packed
 
 SIZE = (80, 60)
@@ -339,3 +341,38 @@ def test_every_source_ends_when_it_is_told_to(tmp_path: Path) -> None:
         threading.Thread(target=run, daemon=True).start()
         live.close()
         assert ended.wait(HANG_S)
+
+
+class Broken:
+    """What an opened source may break, one at a time."""
+
+    def __init__(self, *items: object) -> None:
+        self._items = items
+
+    def blocks(self) -> Iterator[Any]:
+        yield from self._items
+
+    def close(self) -> None:
+        pass
+
+
+def test_ours_keep_what_the_family_promises(drive: Events, tmp_path: Path) -> None:
+    write_recording(tmp_path / "drive.raw", [drive], SIZE)
+    check_live(Replay(str(tmp_path / "drive.raw"), speed=100.0))
+    check_live(Tail(str(tmp_path / "drive.raw")))
+
+
+@pytest.mark.parametrize(
+    ("opened", "words"),
+    [
+        (Broken(), "must give something"),
+        (Broken(None), "must give events here"),
+        (Broken("events"), "must give events here"),
+        (Broken(Block(*[np.zeros(1)] * 4)), "must be t_us int64"),  # type: ignore[arg-type]
+        (object(), r"must have blocks\(\)"),
+    ],
+)
+def test_what_breaks_it_is_said(opened: object, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Replay, "open", lambda self, size: opened)
+    with pytest.raises(AssertionError, match=words):
+        check_live(Replay("made"))

@@ -47,6 +47,7 @@ function explained(m) {
     parts.push(`${Math.round(map.along[m.item])} m along the route`);
   }
   if (m.probability !== null) parts.push(`${percent(m.probability)} sure`);
+  if (m.last && !SURE.includes(m.state)) parts.push(`last at place ${m.last.place}`);
   if (m.state === "no-events" && m.silent_s >= 1) parts.push(`none for ${m.silent_s.toFixed(0)} s`);
   return parts.join(" · ");
 }
@@ -192,6 +193,9 @@ function drawRoute() {
   drawScale(context, width, height, scale);
   drawTrail(context, at);
   if (match && match.easting !== null) drawBelief(context, at, scale);
+  else if (match && match.last && match.last.easting !== null) {
+    disc(context, at([match.last.easting, match.last.northing]), 8, colours.panel, colours["no-events"], 3);
+  }
 }
 
 function drawWay(context, at) {
