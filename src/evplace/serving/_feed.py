@@ -19,8 +19,8 @@ from evplace.serving._recorder import Recorder
 from evplace.sources.live import Facts, Live
 from evplace.sources.readers import Block
 
-HOLD = 4_000_000
-"""Events that are held at most: 52 MB, 0.2 s at 20 million a second."""
+HOLD = 6_000_000
+"""Events that are held at most: 78 MB, 0.3 s at 20 million a second."""
 PACKETS = 4096
 """Packets that are held at most, whatever is in them."""
 PACKET = 100_000

@@ -17,7 +17,7 @@ ITEMS = 1000
 """Items that are looked at, at most."""
 END_S = 60.0
 """Seconds within which a source that was closed must end; a busy machine is slow."""
-FIELDS = (np.int64, np.uint16, np.uint16, np.bool_)
+FIELDS = tuple(map(np.dtype, (np.int64, np.uint16, np.uint16, np.bool_)))
 
 
 def check_live(source: Source, size: Size | None = None) -> None:
