@@ -115,7 +115,8 @@ class Localizer:
     @property
     def settings(self) -> dict[str, Any]:
         """The resolved settings of the matcher, with its name."""
-        return {"name": families.name_of("matchers", self.matcher)} | to_dict(self.matcher)
+        probabilistic = {"probabilistic": True} if getattr(self.matcher, "probabilistic", False) else {}
+        return {"name": families.name_of("matchers", self.matcher)} | to_dict(self.matcher) | probabilistic
 
     def reset(self) -> None:
         """Forget the drive so far."""

@@ -5,8 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from evplace.cli._output import note
 from evplace.core.errors import EvplaceError
-from evplace.placemap import remembered
+from evplace.localizer import Localizer
+from evplace.placemap import PlaceMap, remembered
+
+NOT_MEASURED = (
+    "the map could not be measured on itself (it is shorter than 150 m or has fewer than 50 images): matches "
+    "have no probability, and none is rejected"
+)
+"""Said of a map whose matcher is calibrated where that can be."""
 
 
 def of_map(args: Any) -> str:
@@ -21,3 +29,21 @@ def settings_of_matcher(args: Any) -> dict[str, object]:
     """The settings that flags give, those with flags of their own among them."""
     own = {name: getattr(args, name) for name in ("false_accept", "lag_s")}
     return dict(args.set) | {name: value for name, value in own.items() if value is not None}
+
+
+def is_measured(place_map: PlaceMap) -> bool:
+    """Whether the map tells known from unknown, as far as its matcher is one that learns that."""
+    learns = hasattr(place_map.matcher, "learn")
+    return not learns or place_map.learned is not None
+
+
+def note_matches(where: Localizer, matches: int, accepted: int) -> None:
+    """Say what a user would wonder at: that no match has a probability, or none was accepted."""
+    if not is_measured(where.map):
+        note(NOT_MEASURED)
+    if matches and not accepted:
+        note(
+            f"none of the {matches} matches was accepted: the drive may be of another road or sensor than the "
+            f"map, or the matcher '{where.settings['name']}' asks for too much; --matcher best accepts all, "
+            "--false-accept 0.1 more"
+        )

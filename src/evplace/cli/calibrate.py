@@ -16,6 +16,7 @@ from typing import Annotated
 import numpy as np
 import tyro
 
+from evplace.cli._matcher import NOT_MEASURED, is_measured
 from evplace.cli._output import note, print_facts, print_json
 from evplace.cli._settings import a_part_of
 from evplace.core import families
@@ -49,12 +50,6 @@ def run(args: Args) -> int:
                 f"{name}_threshold": round(float(np.quantile(values, 0.99)), 3),
             }
     print_json(facts) if args.json else print_facts(str(args.map), facts)
-    if len(facts) == 1:
+    if not is_measured(measured):
         note(NOT_MEASURED)
     return 0
-
-
-NOT_MEASURED = (
-    "the map cannot be measured on itself (it is shorter than 150 m, has fewer than 50 images, or its "
-    "matcher learns nothing): matches will have no probability, and none is rejected by it"
-)

@@ -17,7 +17,7 @@ from typing import Annotated, ClassVar, Literal
 
 import tyro
 
-from evplace.cli._matcher import of_map, settings_of_matcher
+from evplace.cli._matcher import note_matches, of_map, settings_of_matcher
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
 from evplace.cli._recording import DriveFlags
 from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
@@ -26,7 +26,7 @@ from evplace.core.errors import MissingExtraError, SettingsError
 from evplace.core.storage import check_new_folder
 from evplace.evaluation import MARK
 from evplace.evaluation._evaluate import evaluate
-from evplace.evaluation.charts import curve_chart
+from evplace.evaluation.charts import curve_chart, reliability_chart
 from evplace.evaluation.truth import Truth, by_frames, by_matrix
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
@@ -34,7 +34,8 @@ from evplace.placemap import PlaceMap
 
 TIMINGS = {"live": "live answers", "hindsight": "answers in hindsight"}
 SHOWN = (
-    "queries", "left_out", "accuracy", "accuracy_seen", "rejection_rate", "precision", "recall",
+    "queries", "left_out", "accuracy", "accuracy_seen", "rejection_rate", "false_accept_rate", "auroc",
+    "within_20_m", "within_10_m", "within_5_m", "precision", "recall",
     "recall_accepted", "average_precision", "recall_at_full_precision", "recall@1", "recall@5", "recall@10",
     "recall@20", "chance", "gallery_spacing_m", "delay_images",
 )  # fmt: skip
@@ -113,12 +114,15 @@ def run(args: Args) -> int:
     result.save(args.out, args.overwrite, args.scores)
     with contextlib.suppress(MissingExtraError):  # a result is whole without its picture
         curve_chart(result, args.out / "pr_curve.png")
+        if result.is_probabilistic:
+            reliability_chart(result, args.out / "reliability.png")
     if args.json:
         print_json(result.figures)
     else:
         shown = {name: result.figures[name] for name in SHOWN if result.figures.get(name) is not None}
         print_facts(f"{args.out}: {TIMINGS[args.answers]}", shown)
     note_guesses(query.info.get("notes"))
+    note_matches(where, result.figures["judged"], int(result.answers.accepted.sum()))
     if query.info.get("fault"):
         note(f"{query.info['fault']}; the good part was measured")
         return USED_GOOD_PART

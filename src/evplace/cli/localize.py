@@ -24,7 +24,7 @@ from typing import Annotated, ClassVar
 
 import tyro
 
-from evplace.cli._matcher import of_map, settings_of_matcher
+from evplace.cli._matcher import note_matches, of_map, settings_of_matcher
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.cli._recording import DriveFlags
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
@@ -86,8 +86,15 @@ class _Drive:
     def __init__(self, where: Localizer, args: Args) -> None:
         self._where, self._args = where, args
         self.fault: str | None = None
+        self.matches, self.accepted = 0, 0
 
     def __iter__(self) -> Iterator[Match]:
+        for match in self._matches():
+            self.matches += match.state != "no-events"
+            self.accepted += match.state in ("localised", "standing")
+            yield match
+
+    def _matches(self) -> Iterator[Match]:
         events = self._events()
         if events is None:
             query = self._where.map.open(self._args.source, mask=self._where.mask, **self._args.reading())
@@ -142,6 +149,7 @@ def run(args: Args) -> int:
         writer.writerow(COLUMNS)
         for match in matches:
             writer.writerow(_row(match, where.map))
+    note_matches(where, matches.matches, matches.accepted)
     if matches.fault is not None:
         note(f"{matches.fault}; the good part was localised")
     return USED_GOOD_PART if matches.fault is not None else 0

@@ -21,6 +21,7 @@ from typing import Annotated, Any, ClassVar
 
 import tyro
 
+from evplace.cli._matcher import NOT_MEASURED, is_measured
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json, progress
 from evplace.cli._recipe import recipe_settings, spacing_given
 from evplace.cli._recording import DriveFlags
@@ -116,6 +117,8 @@ def run(args: Args) -> int:
     }
     print_json(facts) if args.json else print_facts(str(args.out), facts)
     note_guesses(reference.info.get("notes"))
+    if not is_measured(learned):
+        note(NOT_MEASURED)
     if reference.info.get("fault"):
         note(f"{reference.info['fault']}; the good part was learned")
         return USED_GOOD_PART

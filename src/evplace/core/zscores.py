@@ -17,6 +17,6 @@ def robust_z(row: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
     low, middle, high = (int(share * (len(values) - 1)) for share in (0.16, 0.5, 0.84))
     ordered = np.partition(values, sorted({low, middle, high}))
     spread = float(ordered[high] - ordered[low]) / 2
-    if spread <= 1e-6 * max(float(np.abs(values).max()), 1e-30):
+    if spread <= 1e-6 * float(np.abs(ordered[[low, middle, high]]).max()):
         return np.zeros(len(values), np.float32)
     return np.asarray((values - ordered[middle]) / np.float32(spread), np.float32)

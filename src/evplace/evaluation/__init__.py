@@ -31,6 +31,7 @@ from evplace.evaluation._measures import (
     gallery_spacing,
     hits_at,
     precision_recall,
+    reliability,
 )
 from evplace.evaluation._result import MARK, OUTCOMES, Result
 from evplace.evaluation._samples import ItemImages, Samples, choose, pictures
@@ -52,6 +53,7 @@ __all__ = [
     "hits_at",
     "measure",
     "precision_recall",
+    "reliability",
     "sample",
     "versions",
 ]
@@ -84,7 +86,11 @@ def measure(
     figures = (
         {"queries": len(judged), "left_out": int(np.sum(~judged)), "items": truth.n_items}
         | _measures.at_decision(accepted[judged], right[judged], seen[judged])
+        | _measures.within(
+            _apart(answers, here, there)[judged], accepted[judged], right[judged], seen[judged]
+        )
         | _measures.of_curve(curve)
+        | {"auroc": _measures.auroc(answers.score[judged], seen[judged])}
         | _measures.chance(shares[judged], seen[judged])
         | (_measures.recalls(ranked[judged], seen[judged]) if ranked is not None else {})
         | {"gallery_spacing_m": None if positions is None else gallery_spacing(positions)}
@@ -179,6 +185,14 @@ def _nearest_right(block: Bools, here: Floats | None, there: Floats | None) -> N
         apart = np.hypot(here[:, 0, None] - there[:, 0], here[:, 1, None] - there[:, 1])
         nearest = np.argmin(np.where(block & np.isfinite(apart), apart, np.inf), axis=1)
     return np.where(block.any(axis=1), nearest, -1)
+
+
+def _apart(answers: Answers, here: Floats | None, there: Floats | None) -> Floats:
+    """(queries,) metres from each query to its answer; NaN where unknown."""
+    if here is None or there is None:
+        return np.full(len(answers.item), np.nan)
+    away = here - there[answers.item]
+    return np.where(answers.item >= 0, np.hypot(away[:, 0], away[:, 1]), np.nan)
 
 
 def _known(xy: ArrayLike | None, many: int) -> Floats | None:

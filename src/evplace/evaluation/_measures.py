@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+WITHIN_M = (20, 10, 5)
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
@@ -60,6 +61,37 @@ def hits_at(scores: NDArray[np.floating[Any]], right: Bools, n: ArrayLike) -> Fl
     return np.where((top > -np.inf)[:, :, None], np.stack(cases, axis=1), 0.0)
 
 
+def auroc(score: ArrayLike, seen: ArrayLike) -> float | None:
+    """Chance that a seen query has a higher score than an unseen one, ties counting half.
+
+    The area under the curve of accepted seen over accepted unseen queries; NaN scores are the lowest. None
+    where all queries are seen, or none.
+    """
+    values = np.asarray(score, np.float64)
+    values = np.where(np.isnan(values), -np.inf, values)
+    known = np.asarray(seen, np.bool_)
+    n_seen, n_unseen = int(known.sum()), int((~known).sum())
+    if not (n_seen and n_unseen):
+        return None
+    _, place, many = np.unique(values, return_inverse=True, return_counts=True)
+    rank = (np.cumsum(many) - (many - 1) / 2)[place]
+    return float((rank[known].sum() - n_seen * (n_seen + 1) / 2) / (n_seen * n_unseen))
+
+
+def reliability(probability: ArrayLike, right: ArrayLike, bins: int = 10) -> Floats:
+    """(bins, 3) mean probability said, share that was right, and queries, of bins of equal width.
+
+    NaN where a bin is empty; queries without a probability are left out.
+    """
+    said, truly = np.asarray(probability, np.float64), np.asarray(right, np.float64)
+    known = ~np.isnan(said)
+    place = np.clip((said[known] * bins).astype(np.int64), 0, bins - 1)
+    many = np.bincount(place, minlength=bins).astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        means = [np.bincount(place, column[known], minlength=bins) / many for column in (said, truly)]
+    return np.column_stack([*means, many])
+
+
 def gallery_spacing(positions: ArrayLike) -> float | None:
     """Mean distance in metres between consecutive items (items, 2) with positions; None where none are."""
     steps = np.hypot(*np.diff(np.asarray(positions, np.float64), axis=0).T)
@@ -79,10 +111,20 @@ def at_decision(accepted: Bools, right: Bools, seen: Bools) -> dict[str, Any]:
         "accuracy_seen": _ratio(tp, n_seen),
         "rejection_rate": _ratio(fn + tn, len(seen)),
         "unseen_rejected": _ratio(tn, n_unseen),
+        "false_accept_rate": _ratio(n_unseen - tn, n_unseen),
         "precision": _ratio(tp, tp + fp),
         "recall": _ratio(tp, n_seen),
         "recall_accepted": _ratio(tp, tp + fn),
     }  # fmt: skip
+
+
+def within(error_m: Floats, accepted: Bools, right: Bools, seen: Bools) -> dict[str, Any]:
+    """Share of the seen queries whose accepted, right answer is at most so many metres off."""
+    good = accepted & right
+    return {
+        f"within_{metres}_m": _ratio(int(np.sum(good & (error_m <= metres))), int(np.sum(seen)))
+        for metres in WITHIN_M
+    }
 
 
 def of_curve(curve: Floats) -> dict[str, Any]:

@@ -71,6 +71,12 @@ class Result:
         return str(self.settings.get("answers", earlier))
 
     @property
+    def is_probabilistic(self) -> bool:
+        """Whether its scores are probabilities that the answer is right."""
+        matcher = self.settings.get("matcher")
+        return isinstance(matcher, dict) and matcher.get("probabilistic") is True
+
+    @property
     def error_m(self) -> Floats:
         """(queries,) metres from each query to the item answered, accepted or not; NaN where unknown."""
         if self.query_xy is None or self.item_xy is None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.drawing import new_figure, save
-from evplace.evaluation import OUTCOMES, Result
+from evplace.evaluation import OUTCOMES, Result, reliability
 
 Curve = tuple[str, NDArray[np.float64], int, str]
 """Its name, (n, 2) recall and precision, the number of its colour, and its style: a key of STYLES."""
@@ -119,6 +119,25 @@ def curves_chart(title: str, curves: Sequence[Curve], path: str | Path) -> None:
     axes.grid(alpha=0.3)
     if named:
         figure.legend(loc="outside right upper", frameon=False, fontsize="small")
+    save(figure, path)
+
+
+def reliability_chart(result: Result, path: str | Path) -> None:
+    """The share of answers that was right over the probability that they were given, as a .png.
+
+    `result` is probabilistic. Raises MissingExtraError without matplotlib.
+    """
+    bins = reliability(result.answers.score[result.judged], result.right[result.judged])
+    figure = new_figure(5, 4.5)
+    axes = figure.add_subplot(
+        xlabel="probability said", ylabel="share right", xlim=(0, 1), ylim=(0, 1.02),
+        title=f"answers: {result.timing}",
+    )  # fmt: skip
+    axes.plot([0, 1], [0, 1], color="0.6", linestyle=":")
+    axes.scatter(
+        bins[:, 0], bins[:, 1], 10 + 290 * bins[:, 2] / max(bins[:, 2].max(), 1), PALETTE[0], alpha=0.75
+    )
+    axes.grid(alpha=0.3)
     save(figure, path)
 
 

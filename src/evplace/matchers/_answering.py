@@ -15,8 +15,6 @@ from evplace.matchers._ways import Ways
 
 Floats = NDArray[np.float64]
 
-RIGHT_M = 20.0
-"""An answer so near to the camera, which looks the same way, is right."""
 OTHERS = 5
 """Runners-up that are named, at most."""
 LIKELY = 0.68

@@ -117,7 +117,7 @@ def message_before(message: Floats, moment: Moment, ways: Ways) -> Floats:
     ticks = min(moment.moved_s / TICK_S, 1.0)
     one, other = np.empty_like(seen), np.empty_like(seen)
     loops.pass_links_back(seen, *ways.links, LINK * ticks, one)
-    loops.move_back(one, ways.way, SPEEDS * ways.pace * moment.moved_s, other)
+    loops.move_back(one, ways.way, SPEEDS * ways.pace * moment.moved_s, float(seen.mean()), other)
     loops.mix_speeds(other, CHANGE * ticks, one)
     back = (1 - JUMP * ticks) * one + JUMP * ticks * seen.mean()
     return np.asarray(back / max(float(back.max()), 1e-300), np.float64)

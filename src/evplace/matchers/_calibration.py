@@ -7,17 +7,18 @@ what the two layers then say of images from there is what they will say of place
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.errors import PlaceMapError
 from evplace.core.zscores import robust_z
 from evplace.matchers import Learned, Route, Rows, Seen
 from evplace.matchers import _surroundings as around
 from evplace.matchers import _traces as traces
-from evplace.matchers._answering import RIGHT_M
 from evplace.matchers._belief import CONTENT, WRONG
-from evplace.matchers._known import features, probability
+from evplace.matchers._known import of_drive, probability
 from evplace.matchers._ways import Ways
 
 Floats = NDArray[np.float64]
@@ -29,6 +30,9 @@ OTHER_M = 25.0
 """References further away than this show another place."""
 CUT_M = (60.0, 150.0)
 """Shortest and longest stretch that is cut out, or left."""
+NEAR_M, LIKE_DEG = 35.0, 60.0
+"""Up to so far from what is left of the map, an image of its own drive may look like it: nearer than on any
+later drive, so that such images would tell too much."""
 SHORTEST_M = 150.0
 """A map shorter than this cannot do without a stretch."""
 LEAST_ITEMS = 50
@@ -51,7 +55,7 @@ def measured(route: Route, rows: Callable[[slice], Rows]) -> Learned:
     learned = {WRONG: _wrong(ways, own), CONTENT: np.array([route.content])}
     unknown = [_trial(route, own, learned, keep) for keep in _cuts(ways)]
     live, late = (np.sort(np.concatenate(column)) for column in zip(*unknown, strict=True))
-    return learned if len(live) < LEAST_UNKNOWN else learned | {LIVE: live, LATE: late}
+    return {} if len(live) < LEAST_UNKNOWN else learned | {LIVE: live, LATE: late}
 
 
 def _wrong(ways: Ways, own: Rows) -> Floats:
@@ -79,11 +83,11 @@ def _trial(route: Route, own: Rows, learned: Learned, keep: Bools) -> tuple[Floa
     """(unknown,) what is said, live and late, of those of a map's images whose places are cut out."""
     whole, part = Ways.of(route), Ways.of(_part(route, keep))
     seen, rows = _driven(whole, len(own)), own[:, keep]
-    unknown = np.array([not _known(whole, keep, query) for query in range(len(own))])
+    unknown = np.array([not _near(whole, keep, query) for query in range(len(own))])
     live, late = traces.live(part, rows, seen, learned), traces.late(part, rows, seen, learned)
     return (
-        probability(features(live.signs, live.weight, late=False))[unknown],
-        probability(features(late.signs, late.weight, late=True))[unknown],
+        probability(of_drive(live.signs, live.weight, late=False))[unknown],
+        probability(of_drive(late.signs, late.weight, late=True))[unknown],
     )
 
 
@@ -92,13 +96,39 @@ def _part(route: Route, keep: Bools) -> Route:
     return Route(route.position[keep], route.heading_deg[keep], times)
 
 
-def _known(whole: Ways, keep: Bools, query: int) -> bool:
-    """Whether an image's place is still in the map."""
-    near = keep & (whole.away(query) <= RIGHT_M) & whole.looks_like(query)
-    return bool(near.any())
+def _near(whole: Ways, keep: Bools, query: int) -> bool:
+    """Whether the map still has a place that an image may look like: its own, or what lies ahead of it."""
+    turn = np.abs((whole.heading_deg - whole.heading_deg[query] + 180) % 360 - 180)
+    return bool((keep & (whole.away(query) <= NEAR_M) & ~(turn > LIKE_DEG)).any())
 
 
 def _driven(ways: Ways, images: int) -> list[Seen]:
     """The map's own images as a drive at its usual pace."""
     t_us = np.concatenate([[0.0], np.cumsum(np.minimum(np.diff(ways.way[:images]) / ways.pace, 1.0))]) * 1e6
     return [Seen(int(one), np.nan) for one in t_us]
+
+
+def checked(learned: Learned | None) -> Learned:
+    """What was learned of a map, or nothing; PlaceMapError where it is not such."""
+    if not learned:
+        return {}
+    wrong, content = (np.asarray(learned.get(name)) for name in (WRONG, CONTENT))
+    good = wrong.shape == around.GRID.shape and _are_finite(wrong) and content.shape == (1,)
+    good = good and content.dtype == np.float64 and not (content < 0).any()
+    if not good or not all(_are_shares(np.asarray(learned.get(name))) for name in (LIVE, LATE)):
+        raise PlaceMapError(
+            "what the map has told of itself is damaged or missing in part: measure it again, with "
+            "evplace calibrate"
+        )
+    return learned
+
+
+def _are_shares(values: NDArray[Any]) -> bool:
+    """Whether they are sorted, from 0 to 1."""
+    if values.ndim != 1 or not len(values) or not _are_finite(values):
+        return False
+    return bool((np.diff(values) >= 0).all() and values[0] >= 0 and values[-1] <= 1)
+
+
+def _are_finite(values: NDArray[Any]) -> bool:
+    return values.dtype == np.float64 and bool(np.isfinite(values).all())

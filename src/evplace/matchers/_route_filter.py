@@ -51,8 +51,8 @@ def move(belief: Belief, way: Floats, steps: Floats, out: Belief) -> None:
 
 
 @njit(cache=True, nogil=True)
-def move_back(later: Belief, way: Floats, steps: Floats, out: Belief) -> None:
-    """The transpose of `move`."""
+def move_back(later: Belief, way: Floats, steps: Floats, lost: float, out: Belief) -> None:
+    """The transpose of `move`; `lost` is what comes of that which passes the end."""
     n = len(way)
     for v in range(len(steps)):
         at = 0
@@ -61,7 +61,7 @@ def move_back(later: Belief, way: Floats, steps: Floats, out: Belief) -> None:
             while at < n - 1 and way[at + 1] <= goal:
                 at += 1
             if at == n - 1:
-                out[r, v] = later[at, v] if goal <= way[at] else 0.0
+                out[r, v] = later[at, v] if goal <= way[at] else lost
                 continue
             share = (goal - way[at]) / (way[at + 1] - way[at])
             out[r, v] = (1 - share) * later[at, v] + share * later[at + 1, v]

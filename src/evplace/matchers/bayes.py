@@ -39,8 +39,8 @@ from evplace.matchers import (
 )
 from evplace.matchers._answering import Found, Reader
 from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
-from evplace.matchers._calibration import LATE, LIVE, measured
-from evplace.matchers._known import LATER, SPANS, Means, features, means_ahead, probability
+from evplace.matchers._calibration import LATE, LIVE, checked, measured
+from evplace.matchers._known import Means, features, means_ahead, of_drive, probability
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
 from evplace.matchers._ways import Ways
@@ -49,6 +49,8 @@ Floats = NDArray[np.float64]
 
 UNDECIDED = 0.1
 """Below this share of the threshold an answer is no longer lost, but of a place never seen."""
+LEAST = 0.1
+"""An answer less probable than this is accepted by no calibration."""
 ALIKE = 0.5
 """A runner-up with so large a share of the best one's belief makes an answer ambiguous."""
 
@@ -84,8 +86,8 @@ class Bayes:
 
     def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
         """See RouteMatcher."""
-        trace = late(Ways.of(route), rows, seen, route.learned or {})
-        right = probability(features(trace.signs, trace.weight, late=True))
+        trace = late(Ways.of(route), rows, seen, checked(route.learned))
+        right = probability(of_drive(trace.signs, trace.weight, late=True))
         return Path(trace.item, right, right > self._threshold(route, LATE))
 
     def start(self, distances: bool = False) -> Matching:  # noqa: ARG002
@@ -102,7 +104,7 @@ class Bayes:
         if self.threshold is not None:
             return self.threshold
         unknown = (route.learned or {}).get(kind)
-        return -1.0 if unknown is None else float(np.quantile(unknown, 1 - self.false_accept))
+        return -1.0 if unknown is None else max(float(np.quantile(unknown, 1 - self.false_accept)), LEAST)
 
 
 Bayes.presets = {"best": Bayes()}
@@ -112,7 +114,7 @@ class _Live:
     """Answers each image at once, from those before it."""
 
     def __init__(self, settings: Bayes, route: Route) -> None:
-        learned = route.learned or {}
+        learned = checked(route.learned)
         self._threshold, self._measured = settings._threshold(route, LIVE), LIVE in learned
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
         self._reader = Reader(self._filter.ways)
@@ -126,7 +128,7 @@ class _Live:
             self._filter.move(drive_s)
         belief = self._filter.see(z, weight)
         found = self._reader.find(belief, z)
-        right = float(probability(self._means.add(found.signs, weight).reshape(-1)))
+        right = float(probability(features(self._means.add(found.signs, weight))))
         return [_answer(self, self._check.queries - 1, belief, found, right, self._clock.standing)]
 
     def finish(self) -> list[Answer]:
@@ -148,7 +150,7 @@ class _Lagging:
     """Answers each image `lag_s` later, when what came next is known, too."""
 
     def __init__(self, settings: Bayes, route: Route) -> None:
-        learned = route.learned or {}
+        learned = checked(route.learned)
         self._threshold, self._measured = settings._threshold(route, LATE), LATE in learned
         self._lag_us = round(settings.lag_s * 1e6)
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
@@ -185,12 +187,12 @@ class _Lagging:
         beliefs, _ = smoothed(moments, self._filter.ways)
         found = [self._reader.find(beliefs[one.moment - first], one.z) for one in self._waiting]
         weights = np.array([one.weight for one in self._waiting])
-        ahead = means_ahead(np.array([one.signs for one in found]), weights, SPANS[list(LATER)])
+        ahead = means_ahead(np.array([one.signs for one in found]), weights)
         answers = []
         for at in range(due):
             one = self._waiting.popleft()
-            means = np.concatenate([self._means.add(found[at].signs, one.weight), ahead[at]], axis=1)
-            right = float(probability(means.reshape(-1)))
+            before = self._means.add(found[at].signs, one.weight)
+            right = float(probability(features(before, ahead[at])))
             belief = beliefs[one.moment - first]
             answers.append(_answer(self, one.query, belief, found[at], right, one.standing))
         while self._waiting and self._waiting[0].moment > self._moved - len(self._moments):

@@ -17,8 +17,8 @@ from evplace.scorers._reduction import blurred, grey, reduced, reduction, unit
 
 Values = NDArray[np.float32]
 """(n, h, w)."""
-FLAT = 1e-6
-"""Below this length what is left of an image is rounding."""
+FLAT = 1e-4
+"""An image whose values, from 0 to 1, differ by less has no contrast but rounding."""
 SURROUNDINGS = 10.0
 """Standard deviation in reduced pixels of what a pixel is compared with."""
 
@@ -46,8 +46,10 @@ class Edges:
         """(n, dimensions): contrast and directions, each of length 1/sqrt(2), or 0 without any contrast."""
         values = np.sqrt(reduced(grey(images), self.height, self.width) / np.float32(255))
         smooth = blurred(values, 0.7)
-        contrast, directions = unit(_contrast(smooth), FLAT), unit(self._directions(smooth), FLAT)
-        return np.concatenate([contrast, directions], axis=1) * np.float32(np.sqrt(0.5))
+        contrast, directions = unit(_contrast(smooth), 0.0), unit(self._directions(smooth), 0.0)
+        vectors = np.concatenate([contrast, directions], axis=1) * np.float32(np.sqrt(0.5))
+        vectors[np.ptp(values, axis=(1, 2)) < FLAT] = 0
+        return vectors
 
     def _directions(self, values: Values) -> NDArray[np.float32]:
         """(n, orientations, rows, columns) how much of each cell's edges runs which way, around its mean."""

@@ -35,7 +35,7 @@ Progress = Callable[[int, int, str], None]
 class Recipe:
     """What the shipped weights were made with."""
 
-    towns: int = 60
+    towns: int = 24
     """Seeds of towns and halls to train on, from 0."""
     bursts: BurstSettings = field(default_factory=BurstSettings)
     """How much is made of each."""

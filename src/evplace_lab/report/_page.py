@@ -20,6 +20,7 @@ from evplace_lab.report._found import Found, Sheet
 from evplace_lab.report._html import Html, join, tag
 from evplace_lab.report._panels import Line, Panel, panels, result_line
 from evplace_lab.report._pictures import Shown, sample_images
+from evplace_lab.report._reliability import drawings
 
 SCRIPTS = ("plots.js", "page.js")
 """In the order in which they stand in the page."""
@@ -46,10 +47,12 @@ def page(found: Found, remark: str | None = None) -> str:
 
 def _sections(found: Found, drawn: list[Panel]) -> Html:
     table, changes, results = found.table, found.ablations, found.results
+    reliable = drawings(results)
     return join(
         _accuracies("table", table, "Accuracy") if table else None,
         _accuracies("real", found.real, "Accuracy on real sets") if found.real else None,
         _section("curves", "Precision and recall", tag("div", id="panels")) if drawn else None,
+        _section("reliability", "Reliability", reliable) if reliable else None,
         _section("ablations", "Ablations", _tables.ablations(changes.rows)) if changes else None,
         _section("look", "A closer look", tag("div", id="look-at")) if results else None,
         _section("results", "All results, in %", _tables.overview(results)) if len(results) > 1 else None,

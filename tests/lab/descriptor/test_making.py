@@ -30,12 +30,14 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(descriptor, "make", lambda *_: SMALL)
+    monkeypatch.setattr(making, "UNSEEN", making.UNSEEN[1:])
 
 
 @pytest.fixture(scope="module")
 def made(out: Path) -> dict[str, Any]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(descriptor, "make", lambda *_: SMALL)
+        patch.setattr(making, "UNSEEN", making.UNSEEN[1:])
         return reproduce("descriptor", out, choice=ONE, workers=2)
 
 

@@ -1,0 +1,348 @@
+"""The filter along a route: against plain matrices; rates, lags, states; maps that cannot be measured."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from evplace.core.errors import PlaceMapError, SettingsError
+from evplace.matchers import Answer, Route, Seen
+from evplace.matchers import _belief as belief
+from evplace.matchers import _route_filter as loops
+from evplace.matchers import _traces as traces
+from evplace.matchers._calibration import LATE, LIVE
+from evplace.matchers._ways import Ways
+from evplace.matchers.bayes import Bayes
+from evplace.testing import check_matcher
+
+Floats = NDArray[np.float64]
+
+
+def road(items: int = 300, spacing: float = 2.0, rate: float = 5.0) -> Route:
+    """A straight road driven at `rate` items a second."""
+    position = np.stack([500_000 + spacing * np.arange(items), np.full(items, 4e6)], axis=1)
+    t_us = (np.arange(items) / rate * 1e6).astype(np.int64)
+    return Route(position, np.full(items, 90.0), t_us, content=50.0)
+
+
+def rows_along(route: Route, at: Floats, seed: int = 0, height: float = 8.0) -> NDArray[np.float32]:
+    """Scores of a drive that is `at` these items: noise, and a peak there; none where `at` is NaN."""
+    items = len(route.position)
+    rows = np.random.default_rng(seed).standard_normal((len(at), items))
+    near = np.exp(-0.5 * ((np.arange(items) - np.nan_to_num(at, nan=-1e9)[:, None]) / 2.0) ** 2)
+    return (rows + height * near).astype(np.float32)
+
+
+def own_rows(route: Route, height: float = 8.0) -> NDArray[np.float32]:
+    return rows_along(route, np.arange(len(route.position), dtype=float), seed=9, height=height)
+
+
+def calibrated(route: Route) -> Route:
+    own = own_rows(route)
+    return route._replace(learned=Bayes().learn(route, lambda part: own[part]))
+
+
+def drive(matcher: Bayes, route: Route, rows: NDArray[np.float32], seen: list[Seen]) -> list[Answer]:
+    following = matcher.follow(route)
+    said = [answer for row, one in zip(rows, seen, strict=True) for answer in following.step(row, one)]
+    return said + following.finish()
+
+
+def at_rate(n: int, rate: float, content: float = 50.0) -> list[Seen]:
+    return [Seen(round(k / rate * 1e6), content) for k in range(n)]
+
+
+def test_it_keeps_what_matchers_promise() -> None:
+    check_matcher(Bayes())
+    check_matcher(Bayes(threshold=0.5))
+
+
+def plain_transition(ways: Ways, seconds: float) -> Floats:
+    """(states, states) column: what becomes of each (reference, speed), one after another."""
+    n, v = len(ways.way), len(belief.SPEEDS)
+    change = np.zeros((n * v, n * v))
+    ticks = min(seconds / belief.TICK_S, 1)
+    for r in range(n):
+        for s in range(v):
+            for to, share in (
+                (s, 1 - belief.CHANGE * ticks),
+                (max(s - 1, 0), belief.CHANGE * ticks / 2),
+                (min(s + 1, v - 1), belief.CHANGE * ticks / 2),
+            ):
+                goal = ways.way[r] + belief.SPEEDS[to] * ways.pace * seconds
+                at = int(np.searchsorted(ways.way, goal, "right")) - 1
+                targets = [(at, 1.0)]
+                if at == n - 1:
+                    targets = [(at, 1.0)] if goal <= ways.way[at] else []
+                elif goal > ways.way[at]:
+                    between = (goal - ways.way[at]) / (ways.way[at + 1] - ways.way[at])
+                    targets = [(at, 1 - between), (at + 1, between)]
+                for target, part in targets:
+                    linked = ways.links.to[ways.links.first[target] : ways.links.first[target + 1]]
+                    passed = belief.LINK * ticks if len(linked) else 0.0
+                    change[target * v + to, r * v + s] += share * part * (1 - passed)
+                    for other in linked:
+                        change[other * v + to, r * v + s] += share * part * passed / len(linked)
+    change *= 1 - belief.JUMP * ticks
+    return change + (1 - change.sum(axis=0)) / len(change)
+
+
+def loop_route() -> Route:
+    """A round of 80 m, driven one and a half times."""
+    angle = np.arange(30) / 20 * 2 * np.pi
+    position = 80 / (2 * np.pi) * np.stack([np.sin(angle), np.cos(angle)], axis=1)
+    return Route(position, (90 + np.rad2deg(angle)) % 360, np.arange(30) * 400_000)
+
+
+@pytest.mark.parametrize("seconds", [0.08, 0.1, 0.7])
+def test_a_move_is_that_of_a_plain_matrix(seconds: float) -> None:
+    ways = Ways.of(loop_route())
+    assert len(ways.links.to)
+    rng = np.random.default_rng(0)
+    before = rng.random((30, len(belief.SPEEDS)))
+    before /= before.sum()
+    work = np.empty_like(before), np.empty_like(before)
+    found = belief.moved(before.copy(), ways, seconds, work)
+    matrix = plain_transition(ways, seconds)
+    np.testing.assert_allclose(found.reshape(-1), matrix @ before.reshape(-1), atol=1e-12)
+
+
+def test_hindsight_is_forward_and_backward_by_plain_matrices() -> None:
+    """Over more moments than are kept at once."""
+    route = loop_route()
+    ways = Ways.of(route)
+    n, v = len(ways.way), len(belief.SPEEDS)
+    queries = traces.BLOCK + 20
+    rows = np.random.default_rng(1).standard_normal((queries, n)).astype(np.float32)
+    seen = at_rate(queries, 10)
+    filter_ = belief.Filter(ways)
+    says = [np.repeat(np.exp(evidence(filter_, row)), v) for row in rows]
+    matrix = plain_transition(ways, 0.1)
+    forward, beliefs = np.full(n * v, 1 / (n * v)), []
+    for query in range(queries):
+        forward = (matrix @ forward if query else forward) * says[query]
+        forward /= forward.sum()
+        beliefs.append(forward)
+    backward, items = np.ones(n * v), []
+    reader = traces.Reader(ways)
+    for query in range(queries - 1, -1, -1):
+        both = (beliefs[query] * backward).reshape(n, v).sum(axis=1)
+        items.append(reader.find(both / both.sum(), traces.robust_z(rows[query])).item)
+        backward = matrix.T @ (backward * says[query])
+        backward /= backward.max()
+    assert traces.late(ways, rows, seen, {}).item.tolist() == items[::-1]
+
+
+def evidence(filter_: belief.Filter, row: NDArray[np.float32]) -> Floats:
+    from evplace.matchers._surroundings import looked_up
+
+    return looked_up(filter_.says, traces.robust_z(row))
+
+
+def test_a_transposed_move_undoes_no_product() -> None:
+    """<later, move(belief)> = <move_back(later), belief>, and so for the links."""
+    ways = Ways.of(loop_route())
+    rng = np.random.default_rng(0)
+    one, later = rng.random((2, 30, len(belief.SPEEDS)))
+    steps = belief.SPEEDS * 0.9
+    there, back = np.empty_like(one), np.empty_like(one)
+    loops.move(one, ways.way, steps, there)
+    loops.move_back(later, ways.way, steps, 0.0, back)
+    np.testing.assert_allclose((later * there).sum(), (back * one).sum())
+    loops.pass_links(one, *ways.links, 0.3, there)
+    loops.pass_links_back(later, *ways.links, 0.3, back)
+    np.testing.assert_allclose((later * there).sum(), (back * one).sum())
+    np.testing.assert_allclose(there.sum(), one.sum())
+
+
+def test_a_drive_is_found_and_a_stranger_is_unseen() -> None:
+    route = calibrated(road())
+    on = np.concatenate([np.arange(20, 120, 0.5), np.full(150, np.nan), np.arange(150, 250, 0.5)])
+    answers = drive(Bayes(), route, rows_along(route, on), at_rate(len(on), 10))
+    item = np.array([answer.item for answer in answers])
+    accepted = np.array([answer.accepted for answer in answers])
+    known = ~np.isnan(on)
+    assert [answer.query for answer in answers] == list(range(len(on)))
+    assert np.abs(item[known][20:200] - on[known][20:200]).max() <= 3
+    assert accepted[known].mean() > 0.9
+    assert accepted[~known][10:].mean() < 0.05
+    states = {answer.estimate.state for answer in answers if answer.estimate is not None}
+    assert {"localised", "unseen"} <= states <= {"localised", "unseen", "lost", "ambiguous"}
+    found = answers[100].estimate
+    assert found is not None
+    assert 0 <= found.uncertainty_m < 10
+    assert 0.5 < found.probability <= 1
+    assert answers[100].item not in found.others
+
+
+@pytest.mark.parametrize("rate", [20, 30, 60])
+def test_images_of_any_rate_give_the_same_answers(rate: int) -> None:
+    route = calibrated(road())
+    on = np.concatenate([np.full(40, np.nan), np.arange(30, 200, 0.5)])
+    at_ten = drive(Bayes(), route, rows_along(route, on), at_rate(len(on), 10))
+    many = rate // 10
+    fine = np.repeat(rows_along(route, on), many, axis=0)
+    faster = drive(Bayes(), route, fine, at_rate(len(fine), rate))[many - 1 :: many]
+    apart = [abs(one.item - other.item) for one, other in zip(at_ten, faster, strict=True)]
+    assert np.quantile(apart[60:], 0.99) <= 3
+    accepted = np.array([[one.accepted, other.accepted] for one, other in zip(at_ten, faster, strict=True)])
+    assert (accepted[:, 0] == accepted[:, 1]).mean() > 0.97
+
+
+def test_a_camera_that_stands_says_nothing_new() -> None:
+    route = calibrated(road())
+    on = np.arange(50, 150, 0.5)
+    rows = rows_along(route, on)
+    standing = rows_along(route, np.full(300, np.nan), seed=5)
+    seen = at_rate(len(on) + 300, 10)
+    seen = [one._replace(content=2.0) if 100 <= at < 400 else one for at, one in enumerate(seen)]
+    answers = drive(Bayes(), route, np.concatenate([rows[:100], standing, rows[100:]]), seen)
+    assert {answer.item for answer in answers[100:400]} == {answers[99].item}
+    states = [answer.estimate.state for answer in answers[100:400] if answer.estimate is not None]
+    assert set(states) == {"standing"}
+    assert abs(answers[-1].item - on[-1]) <= 3
+
+
+def test_a_drive_that_begins_with_a_stop_is_not_sure_of_anything() -> None:
+    route = calibrated(road())
+    rows = np.repeat(rows_along(route, np.array([np.nan])), 80, axis=0)
+    answers = drive(Bayes(), route, rows, at_rate(80, 10, content=2.0))
+    assert not any(answer.accepted for answer in answers)
+
+
+@pytest.mark.parametrize("lag_s", [1.0, 2.0])
+def test_with_a_lag_answers_are_late_and_better(lag_s: float) -> None:
+    route = calibrated(road())
+    on = np.concatenate([np.full(60, np.nan), np.arange(40, 240, 0.5)])
+    rows, seen = rows_along(route, on, height=4.0), at_rate(len(on), 10)
+    following = Bayes(lag_s=lag_s).follow(route)
+    said = [(at, answer) for at, row in enumerate(rows) for answer in following.step(row, seen[at])]
+    assert all(at - answer.query == round(10 * lag_s) for at, answer in said)
+    answers = [answer for _, answer in said] + following.finish()
+    assert [answer.query for answer in answers] == list(range(len(on)))
+    live = drive(Bayes(), route, rows, seen)
+    wrong = [
+        np.mean([abs(one.item - where) > 5 for one, where in zip(some[60:], on[60:], strict=True)])
+        for some in (answers, live)
+    ]
+    assert wrong[0] <= wrong[1]
+
+
+def test_at_the_end_of_a_drive_the_lag_is_hindsight() -> None:
+    """The last answers come all at once, and each from all that was seen."""
+    route = calibrated(road())
+    on = np.arange(40, 60, 0.5)
+    rows, seen = rows_along(route, on), at_rate(len(on), 10)
+    late = drive(Bayes(lag_s=60), route, rows, seen)
+    path = Bayes().in_hindsight(route, rows, seen)
+    assert [answer.item for answer in late] == path.item.tolist()
+    np.testing.assert_allclose([answer.score for answer in late], path.score, atol=1e-5)
+
+
+def test_where_a_map_passes_twice_both_passes_are_one_place() -> None:
+    route = loop_route()
+    assert Ways.of(route).links.first[-1] > 0
+    rows = rows_along(route, np.tile(np.arange(20.0), 3), height=9.0)
+    answers = drive(Bayes(threshold=0.0), route, rows, at_rate(60, 2.5))
+    item = np.array([answer.item for answer in answers])
+    away = np.hypot(*(route.position[item] - route.position[np.tile(np.arange(20), 3)]).T)
+    assert np.mean(away[5:] < 10) > 0.9
+
+
+def test_memory_stays_flat() -> None:
+    route = road(40)
+    following = Bayes(lag_s=1.0).follow(route)
+    rows = rows_along(route, np.arange(0, 40, 0.02))
+    for at, row in enumerate(rows):
+        following.step(row, Seen(at * 100_000, 50.0))
+    kept = vars(following)
+    assert len(kept["_waiting"]) <= 11
+    assert len(kept["_moments"]) <= 12
+
+
+def small(items: int) -> Route:
+    return road(items, spacing=1.0)
+
+
+@pytest.mark.parametrize("items", [1, 2, 50])
+def test_a_map_too_small_to_be_measured_gives_no_probability(items: int) -> None:
+    route = small(items)
+    own = np.ones((items, items), np.float32)
+    assert Bayes().learn(route, lambda part: own[part]) == {}
+    rows = np.random.default_rng(0).random((12, items)).astype(np.float32)
+    for matcher in (Bayes(), Bayes(lag_s=1)):
+        answers = drive(matcher, route, rows, at_rate(12, 10))
+        assert all(answer.accepted for answer in answers)
+        assert all(
+            answer.estimate is not None and np.isnan(answer.estimate.probability) for answer in answers
+        )
+    assert Bayes().in_hindsight(route, rows, at_rate(12, 10)).accepted.all()
+
+
+def test_a_map_whose_images_are_all_alike_is_never_sure() -> None:
+    route = road()
+    alike = np.ones((300, 300), np.float32)
+    learned = Bayes().learn(route, lambda part: alike[part])
+    answers = drive(Bayes(), route._replace(learned=learned), alike[:30], at_rate(30, 10))
+    assert not any(answer.accepted for answer in answers)
+    said = [answer.estimate.probability for answer in answers if answer.estimate is not None]
+    assert max(said) < 0.5
+
+
+def test_a_query_shorter_than_the_history() -> None:
+    route = calibrated(road())
+    assert len(drive(Bayes(lag_s=5), route, rows_along(route, np.array([30.0])), at_rate(1, 10))) == 1
+    assert drive(Bayes(lag_s=5), route, rows_along(route, np.empty(0)), []) == []
+    assert Bayes().in_hindsight(route, rows_along(route, np.array([30.0])), at_rate(1, 10)).item.shape == (1,)
+
+
+def test_more_false_accepts_are_allowed_more_answers_are_accepted() -> None:
+    route = calibrated(road())
+    on = np.concatenate([np.full(100, np.nan), np.arange(30, 130, 0.5)])
+    rows, seen = rows_along(route, on, height=4.5), at_rate(len(on), 10)
+    accepted = [
+        sum(answer.accepted for answer in drive(Bayes(false_accept=share), route, rows, seen))
+        for share in (0.001, 0.01, 0.1, 0.5)
+    ]
+    assert accepted == sorted(accepted)
+
+
+def test_what_was_learned_must_be_what_is_learned() -> None:
+    route = calibrated(road())
+    learned = dict(route.learned or {})
+    for name, wrong in (
+        ("wrong", learned["wrong"][:-1]),
+        ("wrong", np.full(360, np.nan)),
+        (LIVE, learned[LIVE][::-1].copy()),
+        (LATE, learned[LATE] + 2),
+        (LIVE, np.empty(0)),
+        ("content", np.array([1.0, 2.0])),
+        ("content", np.array([-1.0])),
+    ):
+        with pytest.raises(PlaceMapError, match="calibrate"):
+            Bayes().follow(route._replace(learned=learned | {name: wrong}))
+
+
+def test_settings_that_cannot_be_are_refused() -> None:
+    for wrong in ({"false_accept": 0.0}, {"false_accept": 1.0}, {"lag_s": 0.5}, {"lag_s": 61.0}):
+        with pytest.raises(SettingsError, match=next(iter(wrong))):
+            Bayes(**wrong)
+
+
+@settings(max_examples=20)
+@given(st.integers(2, 40), st.integers(0, 99))
+def test_any_rows_give_items_of_the_map(items: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rows = rng.standard_normal((15, items)).astype(np.float32) * 10.0 ** rng.integers(-6, 6)
+    position = rng.uniform(0, 200, (items, 2))
+    position[rng.random(items) < 0.3] = np.nan
+    route = Route(position, rng.uniform(0, 360, items), np.sort(rng.integers(0, 10**8, items)))
+    times = np.sort(rng.integers(0, 10**7, 15))
+    seen = [Seen(int(t), float(c)) for t, c in zip(times, rng.choice([0.0, 50.0, np.nan], 15), strict=True)]
+    for matcher in (Bayes(), Bayes(lag_s=1)):
+        answers = drive(matcher, route, rows, seen)
+        assert [answer.query for answer in answers] == list(range(15))
+        assert all(0 <= answer.item < items and 0 <= answer.score <= 1 for answer in answers)

@@ -1,0 +1,101 @@
+"""The default scorer."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+from conftest import make_drive, make_traverse
+from evplace.core.errors import PlaceMapError, SettingsError, TraverseError
+from evplace.core.zscores import robust_z
+from evplace.imaging.traverse import Traverse
+from evplace.placemap import train
+from evplace.places import PlaceGrid, PlaceRuns
+from evplace.scorers import Learning
+from evplace.scorers.edges import Edges
+from evplace.scorers.fused import VERSIONS, Fused
+from evplace.scorers.trained import Trained
+from evplace.testing import check_scorer
+
+
+@pytest.mark.parametrize("settings", [Fused(), Fused(trained=False), Fused(every_m=0, components=5)])
+def test_it_keeps_what_scorers_promise(settings: Fused) -> None:
+    check_scorer(settings)
+
+
+def test_rows_are_the_sum_of_both_parts(day: Traverse, places: PlaceGrid) -> None:
+    part = Fused()
+    learned = part.learn(day, places, Learning())
+    references = np.asarray(learned.content["references"])
+    queries = references[::7]
+    rows = part.open(learned.content).rows(queries)
+    wanted = [
+        robust_z(sum(robust_z(one.describe(image[None])[0] @ one.describe(references).T) for one in PARTS))
+        for image in queries
+    ]
+    np.testing.assert_allclose(rows, wanted, atol=2e-2)
+
+
+PARTS = (Edges(), Trained())
+
+
+def test_a_reference_a_metre_and_none_of_a_camera_that_stands(day: Traverse, places: PlaceGrid) -> None:
+    """The made street has an image every two metres."""
+    assert day.track is not None
+    assert len(train(day, places, Fused()).items) == len(day)
+    thinned = train(day, places, Fused(every_m=5)).items
+    steps = np.hypot(*np.diff(thinned.position, axis=0).T)
+    assert (steps >= 5).all()
+    assert thinned.t_us is not None
+    standing = day.images.copy()
+    standing[10:20] //= 16
+    lost = dataclasses.replace(day, images=standing, track=None)
+    kept = Fused().learn(lost, PlaceRuns(len(day), every=10), Learning()).images
+    assert kept is not None
+    assert kept.tolist() == [*range(10), *range(20, len(day))]
+
+
+def test_vectors_of_other_descriptors_are_refused(day: Traverse, places: PlaceGrid) -> None:
+    content = dict(Fused().learn(day, places, Learning()).content)
+    about = json.loads(bytes(content[VERSIONS]))
+    for wrong, words in (
+        (about | {"trained": "0" * 64}, "version 000000000000 of the descriptor 'trained'"),
+        ({"trained": about["trained"]}, "version None of the descriptor 'edges'"),
+    ):
+        content[VERSIONS] = json.dumps(wrong).encode()
+        with pytest.raises(PlaceMapError, match=words):
+            Fused().open(content)
+    for odd in (b"[", b"[]"):
+        content[VERSIONS] = odd
+        with pytest.raises(PlaceMapError, match="does not say which descriptors"):
+            Fused().open(content)
+
+
+def test_content_that_does_not_fit_is_refused(day: Traverse, places: PlaceGrid) -> None:
+    whole = dict(Fused().learn(day, places, Learning()).content)
+    vectors = np.asarray(whole["edges_vectors"])
+    holed = vectors.copy()
+    holed[0, 0] = np.nan
+    for wrong in (None, vectors[:-1], vectors[:, :-1], vectors.astype(np.float64), holed):
+        content = {**whole, "edges_vectors": wrong} if wrong is not None else dict(whole)
+        if wrong is None:
+            del content["edges_vectors"]
+        with pytest.raises(PlaceMapError, match="vectors of 'edges'"):
+            Fused().open(content)
+
+
+def test_settings_that_cannot_be_are_refused() -> None:
+    for wrong in ({"every_m": -1.0}, {"components": 0}):
+        with pytest.raises(SettingsError, match="settings of fused"):
+            Fused(**wrong)
+
+
+def test_a_drive_without_any_place_is_refused(places: PlaceGrid) -> None:
+    lost = make_traverse(make_drive(3))
+    assert lost.track is not None
+    nowhere = dataclasses.replace(lost.track, easting=np.full(len(lost), np.nan))
+    with pytest.raises(TraverseError, match="no image of the traverse has a place"):
+        train(dataclasses.replace(lost, track=nowhere), places)
