@@ -23,10 +23,11 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places scorers matchers placemap localizer evaluation doctor testing cli"
+        "core sources imaging drives places scorers matchers placemap localizer serving evaluation doctor "
+        "testing cli"
     ),
     "evplace.core": "errors events grey zscores settings families storage workers drawing",
-    "evplace.sources": "frames readers writers cleaning tracks film simulators",
+    "evplace.sources": "frames readers live writers cleaning tracks film simulators",
     "evplace.imaging": (
         "windows _resampling representations tones images activity averaging recipe stream spacing traverse "
         "sheets"

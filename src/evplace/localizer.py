@@ -40,6 +40,9 @@ Answers = Literal["live", "hindsight"]
 State = StateOfAnswer | Literal["no-events"]
 """What a match is worth: see `evplace.matchers.State`; no-events: the window was empty."""
 
+FOLLOWS_US = 33_333
+"""How long after the last image of one clock the first of another is taken to be, in microseconds."""
+
 
 @dataclass(frozen=True, slots=True)
 class Match:
@@ -120,8 +123,11 @@ class Localizer:
         with families.blaming("matchers", self.matcher):
             self._following: Following = follow(self.matcher, self._route, self._distances)
         self._stepped = 0
+        self.image: NDArray[np.uint8] | None = None
+        """The last image that was matched."""
         self._images: EventImages | None = None
         self._seeing = _Seeing(self.map)
+        self._clock = _Clock()
         self._times_us: dict[int, int] = {}
 
     def push(self, events: Events) -> Iterator[Match]:
@@ -130,6 +136,27 @@ class Localizer:
             self._images = self._open_images(events)
         for image in self._images.push(events):
             yield from self._matches_of(image)
+
+    def tick(self, t_us: int) -> Iterator[Match]:
+        """The matches of all windows that are over once no event up to `t_us` will come any more.
+
+        A camera at rest sends nothing: its windows are closed by time. Where events do come later than that,
+        they belong to the window that is open then.
+        """
+        if self._images is not None:
+            for image in self._images.tick(t_us):
+                yield from self._matches_of(image)
+
+    def new_clock(self) -> Iterator[Match]:
+        """The match of the open window; times start anew with the next event, on the same drive.
+
+        For a camera that was started again: what the matcher knows of the drive is kept.
+        """
+        if self._images is not None:
+            for image in self._images.finish():
+                yield from self._matches_of(image)
+        self._images = None
+        self._clock.begin_anew()
 
     def finish(self) -> Iterator[Match]:
         """The matches that are still to come when the drive is over: that of the last window is one."""
@@ -140,8 +167,9 @@ class Localizer:
 
     def push_image(self, image: NDArray[np.uint8], t_us: int) -> Iterator[Match]:
         """The matches that become known with one more image (h, w) or (h, w, C)."""
+        self.image = image
         self._times_us[self._stepped] = t_us
-        mean, seen = self._seeing.see(image, t_us)
+        mean, seen = self._seeing.see(image, self._clock.passed(t_us))
         yield from self._matches(self._step(self.rows(mean[None])[0], seen))
 
     def match_traverse(self, traverse: Traverse) -> Iterator[Match]:
@@ -304,6 +332,26 @@ class _Seeing:
         """The image, averaged with those before it where the scorer wants that."""
         mean = image if self._averager is None else self._averager.push(image, t_us)
         return mean, Seen(t_us, self._activity.push(mean))
+
+
+class _Clock:
+    """The time of a drive, which goes on where the camera's clock begins anew."""
+
+    def __init__(self) -> None:
+        self._shift_us = 0
+        self._last_us: int | None = None
+        self._anew = False
+
+    def begin_anew(self) -> None:
+        """The next time is of another clock."""
+        self._anew = self._last_us is not None
+
+    def passed(self, t_us: int) -> int:
+        """A time of the camera's clock as one of the drive; the first of another clock follows the last."""
+        if self._anew and self._last_us is not None:
+            self._shift_us, self._anew = self._last_us + FOLLOWS_US - t_us, False
+        self._last_us = t_us + self._shift_us
+        return self._last_us
 
 
 def _matcher(

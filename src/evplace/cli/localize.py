@@ -6,6 +6,8 @@ Examples:
   evplace localize campus.evp night --matcher seqslam --set ds=20
   evplace localize campus.evp night.aedat4 --mask night_hot_pixels.txt
   evplace localize campus.evp night.aedat4 --json              a JSON object a line
+  evplace localize campus.evp night.aedat4 --watch             at the camera's pace, as `evplace serve` does
+  evplace localize campus.evp udp:3333 --watch                 any source of `evplace list live`
 """
 
 from __future__ import annotations
@@ -26,14 +28,16 @@ from evplace.cli._matcher import note_matches, of_map, settings_of_matcher
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.cli._recording import DriveFlags
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
-from evplace.core.errors import DamagedRecordingError
+from evplace.core.errors import DamagedRecordingError, SettingsError
 from evplace.core.storage import new_file
 from evplace.drives.to_traverse import Reading, open_source_for, recorded_as
 from evplace.imaging.traverse import MARK as TRAVERSE
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
+from evplace.serving.watching import watch
 from evplace.sources.cleaning import pixel_mask
 from evplace.sources.film import Film
+from evplace.sources.live import Facts, open_live
 from evplace.sources.readers import Recording
 from evplace.sources.simulators.recording import SimulatedRecording
 
@@ -72,6 +76,8 @@ class Args(SettingsFlags, DriveFlags):
     """Replace what exists."""
     json: bool = False
     """One JSON object a line."""
+    watch: bool = False
+    """Localise at the camera's own pace, and show what is known now line by line."""
 
 
 class _Drive:
@@ -124,6 +130,8 @@ def run(args: Args) -> int:
     where = Localizer(
         PlaceMap.load(args.map), args.matcher, args.preset, args.mask, **settings_of_matcher(args)
     )
+    if args.watch:
+        return _watched(where, args)
     matches = _Drive(where, args)
     if args.out is not None:
         with (
@@ -145,6 +153,19 @@ def run(args: Args) -> int:
     if matches.fault is not None:
         note(f"{matches.fault}; the good part was localised")
     return USED_GOOD_PART if matches.fault is not None else 0
+
+
+def _watched(where: Localizer, args: Args) -> int:
+    """Localise a live source, or a recording as if it were one."""
+    if args.out is not None or args.json:
+        raise SettingsError("--watch shows lines in a terminal: leave out --out and --json")
+    size = args.size or (None if where.map.recipe is None else where.map.recipe.size)
+    source = open_live(str(args.source), size)
+    note_guesses(list(Facts.of(source).notes))
+    fault = watch(where, source, args.map, str(args.source))
+    if fault is not None:
+        note(f"{fault}; the good part was localised")
+    return USED_GOOD_PART if fault is not None else 0
 
 
 def _row(match: Match, place_map: PlaceMap) -> list[object]:

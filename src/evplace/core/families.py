@@ -30,6 +30,7 @@ MODULES = {
 }
 """Family -> folder, where a part is a module."""
 CLASSES = {
+    "live": "evplace.sources.live",
     "representations": "evplace.imaging.representations",
     "scorers": "evplace.scorers",
     "matchers": "evplace.matchers",

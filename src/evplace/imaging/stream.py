@@ -46,6 +46,11 @@ class EventImages:
             if window is not None:
                 yield EventImage(self._imager.image(window.t_us), window)
 
+    def tick(self, t_us: int) -> Iterator[EventImage]:
+        """The images of all windows that are over once no event up to `t_us` will come any more."""
+        for window in self._windows.tick(t_us):
+            yield EventImage(self._imager.image(window.t_us), window)
+
     def finish(self) -> Iterator[EventImage]:
         """The image of the last window, when the stream is over."""
         window = self._windows.finish()

@@ -95,6 +95,17 @@ class TimeWindows:
             yield events[start:stop], (self._close() if stop < len(events) else None)
             start = stop
 
+    def tick(self, t_us: int) -> Iterator[Window]:
+        """The windows that are over once no event up to `t_us` will come any more, with their events.
+
+        Nothing before the first event, which says where windows begin. RecordingError as `push`.
+        """
+        if self._origin_us is None:
+            return
+        self._check_leap(t_us, self._end_us(self._open))
+        while self._end_us(self._open) <= t_us:
+            yield self._close()
+
     def finish(self) -> Window | None:
         """The last window, which no later event has closed; None where there never was an event."""
         return self._close() if self._events else None
@@ -139,6 +150,10 @@ class CountWindows:
             self._t_us = int(events.t_us[stop - 1])
             yield events[start:stop], (self._close() if self._events == self._count else None)
             start = stop
+
+    def tick(self, t_us: int) -> Iterator[Window]:  # noqa: ARG002 - windows by time need it
+        """Nothing: time closes no window that is cut by count."""
+        yield from ()
 
     def finish(self) -> Window | None:
         """The last window, if it holds an event."""

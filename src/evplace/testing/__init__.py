@@ -7,6 +7,7 @@ that says what is broken, and returns nothing where all is well. They need numpy
 from __future__ import annotations
 
 from evplace.testing._datasets import check_dataset
+from evplace.testing._live import check_live
 from evplace.testing._matchers import check_matcher
 from evplace.testing._readers import check_reader
 from evplace.testing._representations import check_representation
@@ -15,6 +16,7 @@ from evplace.testing._scorers import check_descriptor, check_scorer
 __all__ = [
     "check_dataset",
     "check_descriptor",
+    "check_live",
     "check_matcher",
     "check_reader",
     "check_representation",

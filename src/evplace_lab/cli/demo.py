@@ -4,6 +4,7 @@ Examples:
   evplace demo
   evplace demo --out demo
   evplace demo --drive-m 600 --train    a longer street; trains the paper's networks on it, with torch
+  evplace demo --live                   the drive at night on a page, as it goes (the extra 'web')
 
 Nothing is downloaded and no torch is needed: the virtual city makes the drives, and the paper's networks for
 its usual street come with evplace (`--train` makes them anew). The folder keeps report.html, report.png,
@@ -59,10 +60,16 @@ class Args:
     """Train the paper's networks here, in place of those that come with evplace; needs torch."""
     json: bool = False
     """Print one JSON object."""
+    live: bool = False
+    """Only learn the street by day, then replay the drive at night and open the page that shows it."""
+    port: int = 8000
+    """The port of that page."""
 
 
 def run(args: Args) -> int:
     """Make the drives, learn the maps, localise the queries, print and keep the answers."""
+    if args.live:
+        return _live(args)
     if args.drive_m != USUAL_M and not args.train:
         raise SettingsError(
             f"the paper's networks that come with evplace are of the street of {USUAL_M:.0f} m: add --train "
@@ -92,9 +99,34 @@ def run(args: Args) -> int:
     return 0
 
 
+def _live(args: Args) -> int:
+    """Learn the street by day, and serve the drive at night, over and over, until a signal comes."""
+    from evplace.cli import serve
+    from evplace.serving.server import check_web
+
+    check_web()  # before the minutes that follow
+    settings = CitySettings(
+        fps=60, sensors=("ideal",), route_length_m=args.drive_m, conditions=("day", "night"), paths=(1,),
+        keep_events=True,
+    )  # fmt: skip
+    drives = _driven(args.out / "live", settings)
+    place_map = args.out / "live.evp"
+    if not (place_map / MARK).exists():
+        reference = Traverse.load(drives["day-1"] / INPUTS["events"])
+        assert reference.track is not None  # the city knows where it is
+        train(reference, PlaceGrid.from_track(reference.track), preset="best").save(place_map)
+    night = drives["night-1"] / f"{INPUTS['events']}.aedat4"
+    return serve.run(
+        serve.Args(map=place_map, source=str(night), source_set=(("loops", 0),), port=args.port, open=True)
+    )
+
+
 def built_in_drives(folder: Path, drive_m: float) -> dict[str, Path]:
     """The drives that everybody has: name -> folder with a traverse for each input."""
-    settings = CitySettings(fps=60, sensors=("ideal",), route_length_m=drive_m)
+    return _driven(folder, CitySettings(fps=60, sensors=("ideal",), route_length_m=drive_m))
+
+
+def _driven(folder: Path, settings: CitySettings) -> dict[str, Path]:
     with progress("driving through the city") as show:
         paths = generate(folder, settings, progress=lambda at: show(round(at.share * 1000), 1000, at.drive))
     return {path.name: path for path in paths}

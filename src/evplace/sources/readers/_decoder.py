@@ -42,13 +42,13 @@ def main() -> None:
         size, columns = (None if hints[name] is None else tuple(hints[name]) for name in ("size", "columns"))
         known = Hints(size, hints["time_unit"], hints["stream"], columns)
         source: Source = reader.open_here(Path(job["path"]), known)
-        _send(pipe, b"H", {"size": source.size, "notes": source.notes, "streams": list(source.streams)})
+        send(pipe, b"H", {"size": source.size, "notes": source.notes, "streams": list(source.streams)})
         if not job["head"]:
             for block in source.blocks():
-                _send_block(pipe, block)
-        _send(pipe, b"E", {})
+                send_block(pipe, block)
+        send(pipe, b"E", {})
     except EvplaceError as error:
-        _send(pipe, b"E", packed(error))
+        send(pipe, b"E", packed(error))
 
 
 def limit_memory() -> None:
@@ -67,13 +67,13 @@ def limit_work() -> None:
         signal.setitimer(signal.ITIMER_PROF, WORK_S)
 
 
-def _send(pipe: IO[bytes], kind: bytes, value: dict[str, Any]) -> None:
+def send(pipe: IO[bytes], kind: bytes, value: dict[str, Any]) -> None:
     data = json.dumps(value).encode()
     pipe.write(FRAME.pack(kind, len(data), 0) + data)
     pipe.flush()
 
 
-def _send_block(pipe: IO[bytes], block: Block) -> None:
+def send_block(pipe: IO[bytes], block: Block) -> None:
     for start in range(0, len(block.t_us), SLICE):
         part = slice(start, start + SLICE)
         count = len(block.t_us[part])

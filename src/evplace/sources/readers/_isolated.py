@@ -86,7 +86,7 @@ class _Child:
         watchdog.start()
         try:
             assert self._process.stdout is not None
-            return _message(self._process.stdout)
+            return message(self._process.stdout)
         except EOFError:
             self._process.kill()  # which does nothing to one that has ended: its code stays what it was
             endless = self._process.wait() == -getattr(signal, "SIGPROF", 0)
@@ -99,7 +99,7 @@ class _Child:
             watchdog.cancel()
 
 
-def _message(pipe: IO[bytes]) -> dict[str, Any] | Block | None:
+def message(pipe: IO[bytes]) -> dict[str, Any] | Block | None:
     kind, first, second = _decoder.FRAME.unpack(_exactly(pipe, _decoder.FRAME.size))
     if kind == b"B":
         fields: list[NDArray[Any]] = [

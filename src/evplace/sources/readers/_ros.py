@@ -134,7 +134,7 @@ def _first(bag: Bag, wanted: str | None) -> Message:
 
 
 def _opened(bag: Bag, first: Message, streams: list[str]) -> Source:
-    decode = _Packets if first.kind in PACKETS else _Arrays
+    decode = Packets if first.kind in PACKETS else _Arrays
     probe = decode(bag.aligned)
     try:
         data = _plain(first.data, bag.aligned)
@@ -164,7 +164,7 @@ def _plain(data: Bytes, aligned: bool) -> Bytes:
     return unpack(bytes(data), "zstd") if aligned and data[:4] == ZSTD else data
 
 
-class _Packets:
+class Packets:
     """event_camera_msgs/EventPacket: what the camera sent, in the encoding that it used."""
 
     def __init__(self, aligned: bool) -> None:

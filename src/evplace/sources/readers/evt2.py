@@ -5,7 +5,7 @@ Layout: Prophesee, "EVT 2.0 format". The time is 34 bits of microseconds and wra
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -36,17 +36,24 @@ def read(path: Path, hints: Hints) -> Source:
 
 
 def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:
-    state, clock_state = np.zeros(3, np.int64), clock()
+    decode = decoder(shift_us)
     for run in words(path, start, "<u4", WORDS):
-        t_us, x, y = (
-            np.empty(len(run), np.int64),
-            np.empty(len(run), np.uint16),
-            np.empty(len(run), np.uint16),
-        )
-        p = np.empty(len(run), np.bool_)
+        yield decode(run)
+
+
+def decoder(shift_us: int = 0) -> Callable[[NDArray[np.uint32]], Block]:
+    """A run of words -> its events; it remembers the time from one run to the next."""
+    state, clock_state = np.zeros(3, np.int64), clock()
+
+    def decode(run: NDArray[np.uint32]) -> Block:
+        room = len(run)
+        t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
+        p = np.empty(room, np.bool_)
         state[2] = 0
         count = _decode(run, state, clock_state, shift_us, t_us, x, y, p)
-        yield Block(t_us[:count], x[:count], y[:count], p[:count], int(state[2]))
+        return Block(t_us[:count], x[:count], y[:count], p[:count], int(state[2]))
+
+    return decode
 
 
 @njit(cache=True)

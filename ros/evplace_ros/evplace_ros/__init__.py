@@ -1,0 +1,1 @@
+"""evplace as a ROS 2 node."""
