@@ -56,14 +56,14 @@ class Fused:
     """How an image is averaged with those before it."""
     trained: bool = True
     """Whether the trained descriptor takes part; False leaves the edges alone."""
-    components: int = 384
-    """Numbers that are kept of each vector."""
+    components: int = 256
+    """Numbers that are kept of a vector of the edges; half as many of one of the trained descriptor."""
 
     presets: ClassVar[Mapping[str, Fused]]
 
     def __post_init__(self) -> None:
-        if not 0 <= self.every_m < 1e6 or self.components < 1:
-            raise SettingsError("the settings of fused need every_m of 0 or more, components of 1 or more")
+        if not 0 <= self.every_m < 1e6 or self.components < 2:
+            raise SettingsError("the settings of fused need every_m of 0 or more, components of 2 or more")
 
     @property
     def parts(self) -> dict[str, Descriptor]:
@@ -78,7 +78,8 @@ class Fused:
         references = means[np.searchsorted(filled, kept)]
         content: dict[str, NDArray[np.float32] | NDArray[np.uint8] | bytes] = {REFERENCES: references}
         for name, part in self.parts.items():
-            found = compress(_described(part, references), self.components)
+            many = self.components if name == "edges" else self.components // 2
+            found = compress(_described(part, references), many)
             content |= {f"{name}_basis": found.basis, f"{name}_vectors": found.vectors}
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
