@@ -20,6 +20,10 @@ Floats = NDArray[np.float64]
 SIGNS = 4
 SPANS = np.array([1e-3, 4.0, 12.0])
 """Over how many images, at ten a second and while the camera moves, each sign is averaged."""
+LONGER = np.array([sign * len(SPANS) + span for sign in range(SIGNS) for span in range(1, len(SPANS))])
+"""Where the means over the longer spans stand."""
+LEAST_AHEAD = 0.5
+"""Images that must be ahead, by their weights, for these to have a mean."""
 
 
 def signs_of(read: Floats) -> Floats:
@@ -67,15 +71,25 @@ def means_of(signs: Floats, weights: Floats, spans: Floats) -> Floats:
 
 
 def means_ahead(signs: Floats, weights: Floats) -> Floats:
-    """(n, ...) the means of a drive (n, SIGNS), each from its image on, over the longer spans."""
+    """(n, ...) the means of a drive (n, SIGNS), each from its image on, over the longer spans.
+
+    NaN where nothing that is ahead says anything, as at a long stop.
+    """
     ahead: Floats = means_of(signs[::-1].copy(), weights[::-1].copy(), SPANS[1:])[::-1]
+    silent = np.cumsum(weights[::-1])[::-1] < LEAST_AHEAD
+    ahead[silent] = np.nan
     return ahead
+
+
+def joined(before: Floats, ahead: Floats) -> Floats:
+    """(..., features) the means before and ahead; where these are not known, those before stand for them."""
+    return np.concatenate([before, np.where(np.isnan(ahead), before[..., LONGER], ahead)], axis=-1)
 
 
 def of_drive(signs: Floats, weights: Floats, late: bool) -> Floats:
     """(n, features) what the weights are of, for all answers (n, SIGNS) of a drive."""
     before = means_of(signs, weights, SPANS)
-    return np.concatenate([before, means_ahead(signs, weights)], axis=1) if late else before
+    return joined(before, means_ahead(signs, weights)) if late else before
 
 
 def probability(features: Floats) -> Floats:

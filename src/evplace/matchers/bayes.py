@@ -40,7 +40,7 @@ from evplace.matchers import (
 from evplace.matchers._answering import Found, Reader
 from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
 from evplace.matchers._calibration import LATE, LIVE, checked, measured
-from evplace.matchers._known import Means, means_ahead, of_drive, probability
+from evplace.matchers._known import Means, joined, means_ahead, of_drive, probability
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
 from evplace.matchers._ways import Ways
@@ -192,7 +192,7 @@ class _Lagging:
         for at in range(due):
             one = self._waiting.popleft()
             before = self._means.add(found[at].signs, one.weight)
-            right = float(probability(np.concatenate([before, ahead[at]])))
+            right = float(probability(joined(before, ahead[at])))
             belief = beliefs[one.moment - first]
             answers.append(_answer(self, one.query, belief, found[at], right, one.standing))
         while self._waiting and self._waiting[0].moment > self._moved - len(self._moments):

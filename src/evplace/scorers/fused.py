@@ -42,6 +42,8 @@ EDGES_VERSION = "1"
 """Vectors of another version of `Edges` cannot be compared with these."""
 STANDING = 0.5
 """Without positions, images that show less than this share of the usual are left out: the camera stood."""
+FAR_APART_US = 500_000
+"""Images so far apart do not tell whether the camera stood between them."""
 BLOCK = 64
 """Images described at once."""
 
@@ -118,6 +120,8 @@ def _kept(reference: Traverse, places: Places, every_m: float) -> NDArray[np.int
         spacer = Spacer(SpacingSettings(every_m=every_m), reference.track)
         chosen = np.flatnonzero(used).tolist()
         return np.array([at for at in chosen if spacer.keeps(int(reference.t_us[at]), -1)], np.int64)
+    if np.median(np.diff(reference.t_us, prepend=reference.t_us[0])) >= FAR_APART_US:
+        return np.flatnonzero(used)
     shown = activity(reference.images, of_events=bool((reference.counts >= 0).any()))
     return np.flatnonzero(used & ~(shown < STANDING * np.nanmedian(shown[used])))
 
