@@ -121,6 +121,8 @@ def opened(args: Args) -> Iterator[Service]:
     """The service that the flags ask for, and its outputs; they end with the block."""
     place_map = PlaceMap.load(args.map)
     where = Localizer(place_map, args.matcher, args.preset, args.mask, **settings_of_matcher(args))
+    if place_map.recipe is not None and place_map.recipe.cleaning.mask_hot and args.mask is None:
+        note("the map was learned without hot pixels: give those of this camera by --mask")
     size = args.size or (None if place_map.recipe is None else place_map.recipe.size)
     source = open_live(args.source, size, **dict(args.source_set))
     note_guesses(list(Facts.of(source).notes))
