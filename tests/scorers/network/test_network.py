@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from safetensors.numpy import load
 
 from evplace.core.errors import PlaceMapError, SettingsError, TraverseError
 from evplace.imaging.traverse import Traverse
@@ -15,7 +18,7 @@ from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
 from evplace.scorers import Learning
 from evplace.scorers._network import checkpoint
-from evplace.scorers._network.training import batches, train_network
+from evplace.scorers._network.training import batches, set_rate, train_network
 
 torch = pytest.importorskip("torch", reason="the network needs the extra 'train'")
 
@@ -84,11 +87,19 @@ def test_a_seed_gives_the_same_weights(day: Traverse, places: PlaceGrid) -> None
     assert first.content != other.content
 
 
+@pytest.mark.parametrize(
+    "settings", [TrainSettings(dropout=0.2), TrainSettings.presets["tuned"], TrainSettings(augment="light")]
+)
 def test_a_killed_run_goes_on_to_the_same_weights(
-    day: Traverse, places: PlaceGrid, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    settings: TrainSettings,
+    day: Traverse,
+    places: PlaceGrid,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(checkpoint, "EVERY", 2)
-    whole = train(day, places, steps=7, batch=8, dropout=0.2)
+    short = replace(settings, steps=7, batch=8)
+    whole = train(day, places, short)
     file = tmp_path / "run.checkpoint"
 
     def kill(step: int, steps: int, loss: float) -> None:
@@ -96,10 +107,10 @@ def test_a_killed_run_goes_on_to_the_same_weights(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(day, places, steps=7, batch=8, dropout=0.2, learning=Learning(kill, file))
+        train(day, places, short, learning=Learning(kill, file))
     steps_left: list[int] = []
     learning = Learning(lambda step, steps, loss: steps_left.append(step), file)
-    resumed = train(day, places, steps=7, batch=8, dropout=0.2, learning=learning)
+    resumed = train(day, places, short, learning=learning)
     assert steps_left == [5, 6, 7]
     assert resumed.content == whole.content
     assert not file.exists()
@@ -127,14 +138,48 @@ def test_sgd_and_epochs(day: Traverse, places: PlaceGrid) -> None:
     assert seen == [2 * -(-len(day) // 32)] * seen[0]
 
 
+@pytest.mark.parametrize(
+    "changed", [{"weight_decay": 0.5}, {"label_smoothing": 0.2}, {"augment": "events"}, {"augment": "light"}]
+)
+def test_each_setting_changes_the_weights(
+    changed: dict[str, object], day: Traverse, places: PlaceGrid
+) -> None:
+    plain, other = (train(day, places, steps=2, batch=8, **values) for values in ({}, changed))
+    assert plain.content != other.content
+
+
+@pytest.mark.parametrize("optimiser", ["adam", "sgd"])
+def test_weights_decay_by_the_setting_alone(
+    optimiser: Literal["adam", "sgd"], day: Traverse, places: PlaceGrid
+) -> None:
+    """A rate so small that nothing is learned, and a decay so large that it shows."""
+    first, last = (
+        load(
+            train(
+                day, places, optimiser=optimiser, learning_rate=1e-9, weight_decay=decay, steps=1, batch=8
+            ).content["weights.safetensors"]
+        )
+        for decay in (0.0, 5e8)
+    )
+    np.testing.assert_allclose(last["full2.weight"], first["full2.weight"] / 2, atol=1e-6)
+
+
+def test_the_rate_falls_along_half_a_cosine() -> None:
+    optimiser = torch.optim.SGD([torch.zeros(1)], lr=1.0)
+    for done, constant, cosine in ((0.0, 0.1, 0.1), (0.5, 0.1, 0.05), (0.75, 0.1, 0.0146447), (1, 0.1, 0.0)):
+        for schedule, rate in (("constant", constant), ("cosine", cosine)):
+            set_rate(optimiser, TrainSettings(learning_rate=0.1, schedule=schedule), done)  # type: ignore[arg-type]
+            assert optimiser.param_groups[0]["lr"] == pytest.approx(rate, abs=1e-6)
+
+
 def test_presets_say_what_the_paper_and_its_notebook_say() -> None:
     paper = TrainSettings.presets["paper"]
     assert (paper.last_relu, paper.learning_rate, paper.batch, paper.steps) == (True, 0.001, 64, 1000)
     notebook = TrainSettings.presets["notebook"]
-    assert (notebook.dropout, notebook.epochs) == (
-        0.5,
-        1000,
-    )
+    assert (notebook.dropout, notebook.epochs) == (0.5, 1000)
+    for printed in (paper, notebook):
+        assert (printed.augment, printed.schedule) == ("none", "constant")
+        assert (printed.weight_decay, printed.label_smoothing) == (0, 0)
 
 
 def test_one_image_at_a_time_says_what_a_batch_says(network_map: PlaceMap, day: Traverse) -> None:
@@ -143,7 +188,13 @@ def test_one_image_at_a_time_says_what_a_batch_says(network_map: PlaceMap, day: 
     np.testing.assert_allclose(single, scorer.rows(day.images), atol=1e-6)
 
 
-@pytest.mark.parametrize("wrong", [{"batch": 0}, {"steps": -1}, {"seed": -1}, {"learning_rate": 0.0}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"batch": 0}, {"steps": -1}, {"seed": -1}, {"learning_rate": 0.0}, {"epochs": -1},
+        {"weight_decay": -0.1}, {"label_smoothing": 1.0}, {"label_smoothing": -0.1},
+    ],
+)  # fmt: skip
 def test_settings_that_cannot_be_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(SettingsError):
         TrainSettings(**wrong)  # type: ignore[arg-type]
