@@ -29,6 +29,9 @@ class Network:
     last_relu: bool = False
     """ReLU on the last layer (paper, Table 1: yes). Off by default: a place whose logit falls below zero gets
     no gradient from its own images any more."""
+    own_scale: bool = False
+    """Divide each image by its own root mean square, so that more or fewer events all over change nothing
+    (paper: not mentioned)."""
     dropout: float = 0.0
     """Share of activations dropped before each fully connected layer (paper: not mentioned)."""
     label_smoothing: float = 0.0
@@ -80,7 +83,7 @@ class Network:
         from evplace.scorers._network.training import image_shape, train_network
 
         weights = train_network(reference.images, labels, used, places.n, self, learning)
-        graph = onnx_bytes(weights, image_shape(reference.images), self.last_relu)
+        graph = onnx_bytes(weights, image_shape(reference.images), self.last_relu, self.own_scale)
         return Learned({GRAPH: graph, WEIGHTS: save(weights)})
 
     def open(self, content: Content) -> NetworkRows:

@@ -49,14 +49,14 @@ class Method:
     """A preset of the matcher."""
     settings: Values = field(default_factory=dict)
     """Settings of the matcher over those of the preset."""
-    scorer_preset: str | None = None
-    """A preset of the scorer; where none is named and there is one, the paper's."""
     scorer_settings: Values = field(default_factory=dict)
-    """Settings of the scorer over those of the preset."""
-    for_camera: bool = True
-    """Whether it is for camera images, too."""
+    """Settings of the scorer over those of its preset."""
     every: int = 1
     """Use each, every second ... image of map and query."""
+    scorer_preset: str | None = None
+    """A preset of the scorer; where none is named and the scorer has one, the paper's."""
+    for_camera: bool = True
+    """Whether it is for camera images, too."""
 
 
 @dataclass(frozen=True)

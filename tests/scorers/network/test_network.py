@@ -22,8 +22,8 @@ from evplace.scorers._network.training import batches, set_rate, train_network
 
 torch = pytest.importorskip("torch", reason="the network needs the extra 'train'")
 
-from evplace.scorers._network.network import Network, NetworkSettings, to_input, weights_of  # noqa: E402 - only with torch
-from evplace.scorers._network.network_onnx import OPERATORS, check_graph, onnx_bytes  # noqa: E402
+from evplace.scorers._network.network import Network, NetworkSettings, scaled, to_input, weights_of  # noqa: E402 - only with torch
+from evplace.scorers._network.network_onnx import OPERATORS, SCALE, check_graph, onnx_bytes  # noqa: E402
 from evplace.scorers.network import GRAPH, NetworkRows, TrainSettings  # noqa: E402
 
 Images = NDArray[np.uint8]
@@ -59,19 +59,33 @@ def test_layers_in_the_order_of_the_table() -> None:
     assert (network(x) >= 0).all()
 
 
-@pytest.mark.parametrize(
-    ("shape", "last_relu"), [((90, 160), True), ((90, 160), False), ((90, 160, 3), False)]
-)
-def test_the_onnx_graph_says_what_torch_says(shape: tuple[int, ...], last_relu: bool) -> None:
+@pytest.mark.parametrize("shape", [(90, 160), (90, 160, 3)])
+@pytest.mark.parametrize("last_relu", [False, True])
+@pytest.mark.parametrize("own_scale", [False, True])
+def test_the_onnx_graph_says_what_torch_says(
+    shape: tuple[int, ...], last_relu: bool, own_scale: bool
+) -> None:
     torch.manual_seed(1)
     image = (3 if len(shape) == 3 else 1, 90, 160)
-    network = Network(7, image, NetworkSettings(last_relu=last_relu))
+    network = Network(7, image, NetworkSettings(last_relu=last_relu, own_scale=own_scale))
     images = some_images(5, shape)
+    images[0] = 0
+    images[1] //= 50
     network(to_input(images))  # gives the batch norms statistics of their own
     network.eval()
-    scores = NetworkRows(onnx_bytes(weights_of(network), image, last_relu)).rows(images)
+    scores = NetworkRows(onnx_bytes(weights_of(network), image, last_relu, own_scale)).rows(images)
     wanted = torch.softmax(network(to_input(images)), 1).detach().numpy()
     np.testing.assert_allclose(scores, wanted, atol=1e-6)
+
+
+def test_with_a_scale_of_its_own_more_events_all_over_change_little() -> None:
+    images = to_input(some_images(4) // 3)
+    ours = scaled(images)
+    torch.testing.assert_close(scaled(3 * images), ours, rtol=0.1, atol=0)
+    torch.testing.assert_close(
+        ours.square().mean(dim=(2, 3)).sqrt(), torch.full((4, 1), SCALE), rtol=0.2, atol=0
+    )
+    assert not scaled(torch.zeros(1, 1, 8, 8)).any()
 
 
 def test_training_learns_the_drive(network_map: PlaceMap, day: Traverse, places: PlaceGrid) -> None:
@@ -139,8 +153,12 @@ def test_sgd_and_epochs(day: Traverse, places: PlaceGrid) -> None:
 
 
 @pytest.mark.parametrize(
-    "changed", [{"weight_decay": 0.5}, {"label_smoothing": 0.2}, {"augment": "events"}, {"augment": "light"}]
-)
+    "changed",
+    [
+        {"weight_decay": 0.5}, {"label_smoothing": 0.2}, {"augment": "events"}, {"augment": "light"},
+        {"own_scale": True},
+    ],
+)  # fmt: skip
 def test_each_setting_changes_the_weights(
     changed: dict[str, object], day: Traverse, places: PlaceGrid
 ) -> None:
@@ -232,7 +250,7 @@ def test_a_graph_of_other_operators_is_refused(network_map: PlaceMap) -> None:
     assert isinstance(network, bytes)
     check_graph(network)
     model = onnx.load_from_string(network)
-    assert {node.op_type for node in model.graph.node} == OPERATORS
+    assert {node.op_type for node in model.graph.node} == OPERATORS - {"Add", "GlobalLpPool"}
     for change, words in (
         (lambda one: setattr(one.graph.node[3], "op_type", "Loop"), "it holds 'Loop'"),
         (lambda one: setattr(one.graph.node[3], "domain", "someone"), "it holds 'someone'"),

@@ -40,7 +40,8 @@ def train_network(
 
     torch.manual_seed(settings.seed)
     device = "cuda" if torch.cuda.is_available() else "cpu"
-    network = Network(n_places, image_shape(images), NetworkSettings(settings.last_relu, settings.dropout))
+    structure = NetworkSettings(settings.last_relu, settings.dropout, settings.own_scale)
+    network = Network(n_places, image_shape(images), structure)
     # torch's own types know no `to` with a device and a memory format, which it has.
     network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
     optimiser = _optimiser(network, settings)
