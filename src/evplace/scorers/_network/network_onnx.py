@@ -16,16 +16,26 @@ from evplace.core.errors import MissingExtraError, PlaceMapError
 
 OPSET = 17
 INPUT, OUTPUT = "images", "scores"
+SCALE = 0.4
+"""Root mean square of a scaled image: what busy event images have anyhow, where full scale is 1."""
+LEAST = 0.02
+"""Added to its own before: what is nearly empty is not blown up."""
 OPERATORS = frozenset(
-    ("BatchNormalization", "Cast", "Conv", "Div", "Flatten", "Gemm", "MaxPool", "Relu", "Softmax")
-)
+    (
+        "Add", "BatchNormalization", "Cast", "Conv", "Div", "Flatten", "Gemm", "GlobalLpPool", "MaxPool",
+        "Relu", "Softmax",
+    )
+)  # fmt: skip
 """What the graph is made of: a map is an input, and others could run for ever or read files."""
 Port = tuple[str, int, list[str | int]]
 """What a graph takes or gives: name, type of its numbers, shape."""
 
 
 def onnx_bytes(
-    weights: dict[str, NDArray[np.float32]], image: tuple[int, int, int], last_relu: bool
+    weights: dict[str, NDArray[np.float32]],
+    image: tuple[int, int, int],
+    last_relu: bool,
+    own_scale: bool = False,
 ) -> bytes:
     """The graph: `images` (n, C, h, w) uint8 -> `scores` (n, N) float32 softmax probabilities."""
     graph = Graph()
@@ -35,6 +45,8 @@ def onnx_bytes(
         graph.constant(name, value)
     x = graph.add("Cast", [INPUT], to=TensorProto.FLOAT)
     x = graph.add("Div", [x, graph.constant("full_scale", np.array(255, np.float32))])
+    if own_scale:
+        x = _scaled(graph, x, image[1] * image[2])
     for layer in ("1", "2", "3"):
         x = graph.add("Conv", [x, f"conv{layer}.weight", f"conv{layer}.bias"], pads=[2, 2, 2, 2])
         x = graph.add("Relu", [x])
@@ -51,6 +63,14 @@ def onnx_bytes(
     takes: Port = (INPUT, TensorProto.UINT8, ["n", *image])
     gives: Port = (OUTPUT, TensorProto.FLOAT, ["n", len(weights["full3.bias"])])
     return graph.model(takes, gives)
+
+
+def _scaled(graph: Graph, x: str, pixels: int) -> str:
+    """As `scaled` of the network has it; the pool gives the root of the sum of squares."""
+    size = graph.constant("size", np.array(SCALE * np.sqrt(pixels), np.float32))
+    least = graph.constant("least", np.array(LEAST / SCALE, np.float32))
+    own = graph.add("Div", [graph.add("GlobalLpPool", [x], p=2), size])
+    return graph.add("Div", [x, graph.add("Add", [own, least])])
 
 
 def check_graph(network: bytes) -> None:
