@@ -21,7 +21,7 @@ ADVICE = {
     "no fix": "keep the receiver in the open and wait for its fix before driving off",
     "repeated": "have the receiver hold no position while it moves (static navigation off), and in the open",
     "faster": "keep the aerial off walls, which reflect; `max_speed_mps` says how fast the vehicle goes",
-    "against": "keep the aerial off walls, which reflect; see that speed, course and position are of one receiver",
+    "against": "keep the aerial off walls, which reflect; take speed, course and position of one receiver",
     "of a clock": "have the clock set before the log begins, and by GPS time",
     "of the other side": "see on a map which side of the leap is right",
     "duplicate": "let one program alone write the log, each fix once",

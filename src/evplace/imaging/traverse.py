@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import InputError, SettingsError, TraverseError
-from evplace.core.storage import GrowingArray, new_folder, read_array, read_json, write_json
+from evplace.core.storage import GrowingArray, new_folder, read_array, read_json, write_array, write_json
 from evplace.imaging.recipe import Recipe
 from evplace.sources.tracks import Track
 
@@ -177,10 +177,10 @@ class TraverseWriter:
         if self._images is None:
             raise TraverseError("no image came: the recording holds no events, or the folder no images")
         self._images.close()
-        np.save(self._folder / "t_us.npy", np.array(self.t_us, np.int64))
-        np.save(self._folder / "counts.npy", np.array(self._counts, np.int64))
+        write_array(self._folder / "t_us.npy", np.array(self.t_us, np.int64))
+        write_array(self._folder / "counts.npy", np.array(self._counts, np.int64))
         if self.mask is not None:
-            np.save(self._folder / "mask.npy", self.mask)
+            write_array(self._folder / "mask.npy", self.mask)
         zone = None
         if self.track is not None:
             _save_track(self._folder, self.track)
@@ -218,7 +218,7 @@ def _save_track(folder: Path, track: Track) -> None:
         track.northing,
         track.heading_deg,
     )
-    np.save(folder / "track.npy", np.stack(list(columns), axis=1))
+    write_array(folder / "track.npy", np.stack(list(columns), axis=1))
 
 
 def _load_track(folder: Path, t_us: NDArray[np.int64], zone: Any, what: str) -> Track | None:
