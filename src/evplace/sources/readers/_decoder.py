@@ -24,8 +24,8 @@ from evplace.sources.readers._source import Block, Hints, Source
 WORK_S = 8.0
 """Seconds of its own work within which this process gives a block; beyond that it goes round in circles. They
 are counted where the system can: a busy machine must not make a good recording look damaged."""
-MEMORY = 4 << 30
-"""Bytes of address space that it may take, where the system can limit it; a block needs far less."""
+MEMORY = 1 << 29
+"""Bytes that it may take for its data, where the system can limit it; a block needs far less."""
 SLICE = 1 << 19
 """Events that a message carries at most."""
 FRAME = struct.Struct("<cqq")
@@ -58,7 +58,7 @@ def limit_memory() -> None:
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         if sys.platform != "darwin":
-            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+            resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
 
 
 def limit_work() -> None:
