@@ -82,3 +82,9 @@ def test_packets_come_in_the_order_of_their_times() -> None:
 def test_packets_that_were_made_otherwise_are_checked_at_the_door(packet: Events) -> None:
     with pytest.raises(InputError):
         list(EventImages(SIZE).push(packet))
+
+
+@pytest.mark.parametrize("size", [(0, 1), (1, 1 << 17), (-3, 4), (5,)])
+def test_sensors_that_cannot_be(size: Any) -> None:
+    with pytest.raises(InputError, match="cannot be"):
+        Events.of([0], [0], [0], [1], size)

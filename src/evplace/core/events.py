@@ -58,6 +58,8 @@ class Events:
             np.ascontiguousarray(_brighter(p)),
             size,
         )
+        if not (len(size) == 2 and all(0 < side <= 1 << 16 for side in size)):
+            raise InputError(f"a sensor of {size} pixels cannot be: give width and height, up to 65,536")
         found.check()
         return found
 

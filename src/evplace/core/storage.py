@@ -154,6 +154,11 @@ def read_bytes(path: Path, what: str) -> bytes:
         raise InputError(f"cannot read {what}: {path}: {error.strerror}") from error
 
 
+def is_stream(path: Path) -> bool:
+    """Whether it is a pipe, a socket or a device, which may block for ever, or never end."""
+    return path.exists() and not (path.is_file() or path.is_dir())
+
+
 def read_json(path: Path, what: str) -> dict[str, Any]:
     """The JSON object in `path`; InputError, naming `what` it should be, where there is none."""
     try:
@@ -236,7 +241,7 @@ def _finite(text: str) -> float:
 
 def _refuse_device(path: Path, what: str) -> None:
     """InputError for a pipe or a device, which would be read for ever."""
-    if path.exists() and not (path.is_file() or path.is_dir()):
+    if is_stream(path):
         raise InputError(f"cannot read {what}: {path} is no file")
 
 

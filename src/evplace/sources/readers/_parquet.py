@@ -18,6 +18,8 @@ from evplace.sources.readers._source import Block, Hints, Source, printable
 
 EVENTS = 1 << 18
 """Events read at a time."""
+THREADS = 4
+"""One a column: each takes memory of its own, whatever the machine has."""
 BUFFER = 1 << 20
 """Bytes of a column read ahead; without it, a group of rows is read whole."""
 FAULTS = (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError)
@@ -27,6 +29,8 @@ FAULTS = (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError)
 def open_here(path: Path, hints: Hints) -> Source:
     """The columns and the unit of time; RecordingError where they are missing or not clear."""
     try:
+        pyarrow.set_cpu_count(THREADS)
+        pyarrow.set_io_thread_count(1)
         with pyarrow.parquet.ParquetFile(path) as file:
             names = list(file.schema_arrow.names)
             order = _order_of(path, names, hints)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from evplace.core import families, settings
 from evplace.core.errors import EvplaceError, SettingsError, TrackError
+from evplace.core.storage import is_stream
 from evplace.sources._times import DAY_US, day_of
 from evplace.sources.tracks import bag
 from evplace.sources.tracks._fixes import Fixes, Keep
@@ -84,6 +85,8 @@ def format_of(path: Path) -> str:
     """The name of the format of a log, by the file's first bytes; TrackError where none is known."""
     if path.is_dir() and bag.recognises_folder(path):
         return "bag"
+    if is_stream(path):
+        raise TrackError(f"{path} is a pipe or a device: logs are read from files, so save it first")
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES)

@@ -97,6 +97,8 @@ def _by_way(fixes: Fixes, velocity: Floats, max_speed_mps: float) -> Bools:
 def _by_leaps(fixes: Fixes, speed: Floats, max_speed_mps: float) -> Bools:
     """(N,) the fixes that go together where only the movement around them says how it goes on."""
     kept = ~Leaps.of(fixes).wrong()
+    if not kept.any():
+        return kept
     rest, speed = fixes[kept], speed[kept]
     own = bool(np.isfinite(speed).any())
     way = Way.of(rest, _along(rest, speed) if own else _around(rest), OWN_SLACK_M if own else STEPS_SLACK_M)
