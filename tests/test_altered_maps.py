@@ -93,7 +93,7 @@ def answers(folder: Path, query: Traverse) -> bytes:
 
 
 def saved_as(name: str, folder: Path, query: Traverse) -> tuple[Callable[[Path], object], str]:
-    """A map, a traverse or a result in a new folder; what is made of such a folder, and the file that marks it."""
+    """A map, a traverse or a result in a new folder; what uses such a folder, and the file that marks it."""
     if name == "traverse":
         query.save(folder)
         street = train(drive(0), grid(), "ncc")

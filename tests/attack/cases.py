@@ -2,14 +2,18 @@
 
     python cases.py KIND NAME SEED FIRST COUNT BOARD
 
-KIND is flip, cut, log, folder or settings; NAME a format, a kind of log or a kind of folder. Each case is known by
-its number. Before each, its number and the counts so far are written to the file BOARD, so that whoever started this
-knows which one brought it down. What comes out must be an answer or an error that evplace raises on purpose.
+KIND is flip, cut, log, folder or settings; NAME a format, a kind of log or a kind of folder. Each case is
+known by its number. Before each, its number and the counts so far are written to the file BOARD, so that
+whoever started this knows which one brought it down. What comes out must be an answer or an error that
+evplace raises on purpose.
 """
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import io
+import json
 import random
 import resource
 import signal
@@ -21,13 +25,9 @@ from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
-
-TESTS = Path(__file__).parents[1]
-sys.path[:0] = [str(TESTS), *(str(TESTS / "sources" / part) for part in ("readers", "tracks"))]
-
 import numpy as np
 
-from altered import array_alterations, file_alterations, json_alterations, altered
+from altered import altered, array_alterations, file_alterations, json_alterations
 from evplace.core import families
 from evplace.core.errors import EvplaceError
 from evplace.sources.readers import _decoder
@@ -82,7 +82,8 @@ def _memory() -> str | None:
 def _refused(error: EvplaceError) -> bool:
     """False, for a refusal, which must be a line of a sensible length without codes for a terminal."""
     told = str(error)
-    assert "\n" not in told and "\x1b" not in told, told[:300]
+    assert "\n" not in told, told[:300]
+    assert "\x1b" not in told, told[:300]
     assert len(told) < 3000, told[:300]
     return False
 
@@ -223,23 +224,20 @@ def _scrambling(rng: random.Random, files: list[str]) -> Callable[[Path], None]:
 
 
 VALUES = [
-    "0", "-1", "1e999", "-1e999", "nan", "inf", "1e-999", "9" * 400, '""', '"x"', '"1e999999999"', "true", "[]",
-    "[1, 2, 3]", "{}", "{ x = 1 }", "1979-05-27", "99999999999999999999", "0.5", "1", "3", '"1/0"', '"\\u001b[2J"',
+    "0", "-1", "1e999", "-1e999", "nan", "inf", "1e-999", "9" * 400, '""', '"x"', '"1e999999999"', "true",
+    "[]", "[1, 2, 3]", "{}", "{ x = 1 }", "1979-05-27", "99999999999999999999", "0.5", "1", "3", '"1/0"',
+    '"\\u001b[2J"',
 ]  # fmt: skip
 
 
 def _settings(folder: Path, kind: str, name: str, seed: int) -> Case:
-    """A settings file with odd values for one or two settings of a command, and what a command line makes of it."""
-    import contextlib
-    import io
-
+    """A settings file with odd values for one or two settings of a command, and what is made of it."""
     from evplace.cli import main as command
 
     file = folder / "settings.toml"
     told = io.StringIO()
     with contextlib.redirect_stdout(told):
         command([name, "--show-settings", "--json"])
-    import json
 
     keys = sorted(json.loads(told.getvalue()))
 

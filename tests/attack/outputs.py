@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import shutil
@@ -14,7 +15,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from conftest import make_drive, write_drive
-
 from evplace.evaluation import Result
 from evplace.imaging.traverse import Traverse
 from evplace.placemap import PlaceMap
@@ -27,6 +27,10 @@ SIGNALS = ("SIGKILL", "SIGKILL", "SIGTERM", "SIGHUP", "SIGINT")
 
 def _events(path: Path) -> object:
     return sum(map(len, open_recording(path).packets()))
+
+
+def _findings(path: Path) -> object:
+    return json.loads((path / "findings.json").read_text())
 
 
 def _page(path: Path) -> object:
@@ -42,11 +46,12 @@ COMMANDS: dict[str, tuple[list[str], Callable[[Path], object]]] = {
     "images": (["images", "day.aedat4", "-o", "images", "--track", "day.csv"], Traverse.load),
     "map": (["train", "day.aedat4", "--track", "day.csv", "-o", "map", "--scorer", "ncc"], PlaceMap.load),
     "net": (
-        ["train", "day.aedat4", "--track", "day.csv", "-o", "net", "--steps", "5", "--batch", "4"], PlaceMap.load,
+        ["train", "day.aedat4", "--track", "day.csv", "-o", "net", "--steps", "5", "--batch", "4"],
+        PlaceMap.load,
     ),
     "result": (["evaluate", "given.map", "day.aedat4", "--track", "day.csv", "-o", "result"], Result.load),
-    "matches.csv": (["localize", "given.map", "day.aedat4", "-o", "matches.csv"], lambda path: path.read_bytes()),
-    "doctor": (["doctor", "day.aedat4", "--report", "doctor"], lambda path: (path / "findings.json").read_bytes()),
+    "matches.csv": (["localize", "given.map", "day.aedat4", "-o", "matches.csv"], Path.read_bytes),
+    "doctor": (["doctor", "day.aedat4", "--report", "doctor"], _findings),
     "report.html": (["report", "given.result", "-o", "report.html"], _page),
 }  # fmt: skip
 """What a command writes -> its words, and what reads that back."""
@@ -66,7 +71,7 @@ def _command(words: list[str]) -> list[str]:
 
 
 def kills(count: int, seed: int) -> Iterator[Outcome]:
-    """Each writing command, ended at a random moment; what it left must be nothing or whole, and block nobody."""
+    """Each writing command, ended at a random moment: what it left is nothing or whole, and blocks nobody."""
     rng = random.Random(seed)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -129,7 +134,7 @@ def _remove(path: Path) -> None:
 
 
 def full_disks(short: bool = False) -> Iterator[Outcome]:
-    """Each writing command on a disk with too little room: one line, and nothing is left; nothing without a disk."""
+    """Each writing command on a disk with too little room: one line, and nothing is left."""
     with tempfile.TemporaryDirectory() as name, tempfile.TemporaryDirectory() as place:
         folder, disk = Path(name), Path(place)
         for kilobytes in (16,) if short else (4, 16, 64, 256):

@@ -1,10 +1,11 @@
-"""The attack: what other programs, broken disks, full ones, kills and hostile people do to evplace, in great number.
+"""The attack: what other programs, broken and full disks, kills and hostile people do, in great number.
 
     python tests/attack/run.py --share 1          all of it, hours
     python tests/attack/run.py --share 0.01       a hundredth
 
-It prints a line for each kind, and ends with 1 where anything was found: a crash, a hang of over 10 s of work, an
-exception that nobody meant, an output that is not whole, or more than 512 MB of memory. See docs/promises.md.
+It prints a line for each kind, and ends with 1 where anything was found: a crash, a hang of over 10 s of
+work, an exception that nobody meant, an output that is not whole, or more than 512 MB of memory. See
+docs/promises.md.
 """
 
 from __future__ import annotations
@@ -74,7 +75,8 @@ def many(kind: str, name: str, count: int, seed: int) -> Counts:
             board.flush()
             arguments = [kind, name, *map(str, (seed, first, count)), board.name]
             worker = [sys.executable, str(Path(__file__).with_name("cases.py")), *arguments]
-            done = subprocess.run(worker, capture_output=True, text=True)
+            found = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+            done = subprocess.run(worker, capture_output=True, text=True, env=found)
             number, answered, refused, foreign = BOARD.unpack(Path(board.name).read_bytes())
             counts.answered, counts.refused = counts.answered + answered, counts.refused + refused
             counts.foreign += foreign

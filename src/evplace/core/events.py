@@ -110,13 +110,15 @@ def _whole(values: object, name: str, what: str) -> NDArray[Any]:
     array = np.asarray(values)
     if array.dtype.kind not in "iu" and array.size:
         hint = ": round seconds times 1e6" if name == "t_us" and array.dtype.kind == "f" else ""
-        raise InputError(f"`{name}` of events are whole {what}, not {array.dtype}{hint}")
+        raise InputError(f"the {name} of events are whole {what}, not {array.dtype}{hint}")
     return array
 
 
 def _within(values: NDArray[Any], name: str) -> NDArray[Any]:
     if values.size and not (values.min() >= 0 and values.max() <= 0xFFFF):
-        raise InputError(f"`{name}` of events goes from {values.min()} to {values.max()}: it is 0 to 65,535")
+        raise InputError(
+            f"the {name} of events goes from {values.min()} to {values.max()}: it is 0 to 65,535"
+        )
     return values
 
 
@@ -125,5 +127,5 @@ def _brighter(polarities: object) -> NDArray[np.bool_]:
     if array.dtype == np.bool_ or not array.size:
         return array.astype(np.bool_)
     if array.dtype.kind not in "iuf" or not np.isin(array, (-1, 0, 1)).all():
-        raise InputError("`p` of events is true or false, 0 or 1, or -1 and 1: it holds other values")
+        raise InputError("the p of events is true or false, 0 or 1, or -1 and 1: it holds other values")
     return np.asarray(array > 0, np.bool_)

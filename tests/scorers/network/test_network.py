@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -174,6 +175,10 @@ def test_one_place_only_is_learned(day: Traverse) -> None:
     assert Localizer(learned).rows(day.images[:2]).tolist() == [[1.0], [1.0]]
 
 
+def image_of(model: Any) -> Any:
+    return model.graph.input[0].type.tensor_type.shape
+
+
 def test_a_graph_of_other_operators_is_refused(network_map: PlaceMap) -> None:
     """A loop could run for ever, and weights in other files would be read from anywhere."""
     onnx = pytest.importorskip("onnx")
@@ -191,6 +196,13 @@ def test_a_graph_of_other_operators_is_refused(network_map: PlaceMap) -> None:
             "weights lie in other files",
         ),
         (lambda one: setattr(one.graph.initializer[0], "data_location", 1), "weights lie in other files"),
+        (lambda one: one.graph.node[2].attribute[0].ints.__setitem__(0, 50_000), "layers too large"),
+        (lambda one: one.graph.node.extend([one.graph.node[3]] * 99), "too many"),
+        (
+            lambda one: setattr(one.graph.input[0].type.tensor_type.shape.dim[2], "dim_value", 10**8),
+            "takes images",
+        ),
+        (lambda one: one.graph.input[0].type.tensor_type.shape.dim.pop(), "cannot be run|takes images"),
     ):
         changed = onnx.load_from_string(network)
         change(changed)
