@@ -116,9 +116,7 @@ def _whole(values: object, name: str, what: str) -> NDArray[Any]:
 
 def _within(values: NDArray[Any], name: str) -> NDArray[Any]:
     if values.size and not (values.min() >= 0 and values.max() <= 0xFFFF):
-        raise InputError(
-            f"the {name} of events go from {values.min()} to {values.max()}: from 0 to 65,535 can be"
-        )
+        raise InputError(f"the {name} of events is 0 to 65,535, not {values.min()} to {values.max()}")
     return values
 
 
