@@ -5,9 +5,11 @@ The weights are kept as safetensors, and as the ONNX graph that answers.
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from evplace.scorers import Content, Learned, Learning, usable
 
 BATCH = 64
 """Images scored at once: larger batches gain nothing and cost memory."""
+MOST_S = 10.0
+"""Seconds after which a network that scores one image is stopped."""
 GRAPH, WEIGHTS = "network.onnx", "weights.safetensors"
 
 
@@ -129,6 +133,7 @@ class NetworkRows:
             raise _unfit(error) from error
         if [one.name for one in self._session.get_inputs()] != [INPUT]:
             raise PlaceMapError(f"the map's {GRAPH} does not take '{INPUT}' alone")
+        _try(self._session)
 
     def rows(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
         """See OpenScorer."""
@@ -139,6 +144,29 @@ class NetworkRows:
             return np.concatenate(scores)
         except Exception as error:  # likewise; so is a graph that fits neither these images nor itself
             raise _unfit(error) from error
+
+
+def _try(session: Any) -> None:
+    """Run a network once on a black image, in bounded time; PlaceMapError where it gives no row of scores."""
+    import onnxruntime as ort
+
+    from evplace.scorers._network.network_onnx import INPUT, MOST_PIXELS
+
+    shape = session.get_inputs()[0].shape[1:]
+    sizes = [side for side in shape if type(side) is int and side > 0]
+    if len(shape) != 3 or len(sizes) != 3 or math.prod(sizes) > MOST_PIXELS:
+        raise PlaceMapError(f"the map's {GRAPH} takes images of shape {shape!r}, which none has")
+    how = ort.RunOptions()
+    late = threading.Timer(MOST_S, lambda: setattr(how, "terminate", True))
+    late.start()
+    try:
+        scores = session.run(None, {INPUT: np.zeros((1, *shape), np.uint8)}, how)[0]
+    except Exception as error:  # onnxruntime's errors share no public base
+        raise _unfit(error) from error
+    finally:
+        late.cancel()
+    if scores.ndim != 2 or len(scores) != 1 or scores.dtype != np.float32:
+        raise PlaceMapError(f"the map's {GRAPH} gives {scores.dtype} {scores.shape}, not a row of scores")
 
 
 def file_of(content: Content, name: str) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -162,7 +162,7 @@ def test_sgd_and_epochs(day: Traverse, places: PlaceGrid) -> None:
 def test_each_setting_changes_the_weights(
     changed: dict[str, object], day: Traverse, places: PlaceGrid
 ) -> None:
-    plain, other = (train(day, places, steps=2, batch=8, **values) for values in ({}, changed))
+    plain, other = (train(day, places, "network", steps=2, batch=8, **values) for values in ({}, changed))
     assert plain.content != other.content
 
 
@@ -174,7 +174,14 @@ def test_weights_decay_by_the_setting_alone(
     first, last = (
         load(
             train(
-                day, places, optimiser=optimiser, learning_rate=1e-9, weight_decay=decay, steps=1, batch=8
+                day,
+                places,
+                "network",
+                optimiser=optimiser,
+                learning_rate=1e-9,
+                weight_decay=decay,
+                steps=1,
+                batch=8,
             ).content["weights.safetensors"]
         )
         for decay in (0.0, 5e8)
@@ -243,6 +250,10 @@ def test_one_place_only_is_learned(day: Traverse) -> None:
     assert Localizer(learned).rows(day.images[:2]).tolist() == [[1.0], [1.0]]
 
 
+def image_of(model: Any) -> Any:
+    return model.graph.input[0].type.tensor_type.shape
+
+
 def test_a_graph_of_other_operators_is_refused(network_map: PlaceMap) -> None:
     """A loop could run for ever, and weights in other files would be read from anywhere."""
     onnx = pytest.importorskip("onnx")
@@ -260,6 +271,13 @@ def test_a_graph_of_other_operators_is_refused(network_map: PlaceMap) -> None:
             "weights lie in other files",
         ),
         (lambda one: setattr(one.graph.initializer[0], "data_location", 1), "weights lie in other files"),
+        (lambda one: one.graph.node[2].attribute[0].ints.__setitem__(0, 50_000), "layers too large"),
+        (lambda one: one.graph.node.extend([one.graph.node[3]] * 99), "too many"),
+        (
+            lambda one: setattr(one.graph.input[0].type.tensor_type.shape.dim[2], "dim_value", 10**8),
+            "cannot be run|takes images",
+        ),
+        (lambda one: one.graph.input[0].type.tensor_type.shape.dim.pop(), "cannot be run|takes images"),
     ):
         changed = onnx.load_from_string(network)
         change(changed)

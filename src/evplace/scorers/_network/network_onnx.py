@@ -20,6 +20,10 @@ SCALE = 0.4
 """Root mean square of a scaled image: what busy event images have anyhow, where full scale is 1."""
 LEAST = 0.02
 """Added to its own before: what is nearly empty is not blown up."""
+MOST_NODES, MOST_NUMBER = 64, 16
+"""How many nodes a graph has at most, and how large a number in one is: paddings, strides and kernels."""
+MOST_PIXELS = 1 << 25
+"""Numbers of an image that a network may ask for."""
 OPERATORS = frozenset(
     (
         "Add", "BatchNormalization", "Cast", "Conv", "Div", "Flatten", "Gemm", "GlobalLpPool", "MaxPool",
@@ -86,17 +90,28 @@ def check_graph(network: bytes) -> None:
         kinds = {kind.text for node in nodes for kind in node.parts(4)}
         foreign = {kind.text for node in nodes for kind in node.parts(7)} - {""}
         others = sorted(kinds - OPERATORS) or sorted(foreign) or ["functions of its own"] * model.has(25)
+        large = any(abs(number) > MOST_NUMBER for node in nodes for number in _numbers(node))
         elsewhere = any(graph.has(15) for graph in graphs) or any(
             one.has(13) or one.has(14) for one in tensors
         )
     except IndexError as error:
         raise PlaceMapError("the map's network is damaged: it is no ONNX graph") from error
+    if len(nodes) > MOST_NODES or large:
+        raise PlaceMapError("the map's network is none that evplace writes: layers too large, or too many")
     if others:
         raise PlaceMapError(
             f"the map's network is none that evplace writes: it holds {', '.join(others)[:99]!r}"
         )
     if elsewhere:
         raise PlaceMapError("the map's network is none that evplace writes: its weights lie in other files")
+
+
+def _numbers(node: _Message) -> Iterator[int]:
+    """The whole numbers among a node's attributes: i, and ints, packed or not."""
+    for attribute in node.parts(5):
+        for kind, value in attribute.numbers():
+            if kind in (3, 8):
+                yield value
 
 
 class _Message:
@@ -119,6 +134,17 @@ class _Message:
     def parts(self, number: int) -> list[_Message]:
         """The messages, or texts, of that number."""
         return [_Message(value) for found, value in self._fields if found == number]
+
+    def numbers(self) -> Iterator[tuple[int, int]]:
+        """Number of the field and value of each whole number, also of those in a packed row."""
+        for found, value in self._fields:
+            if isinstance(value, int):
+                yield found, _signed(value)
+            elif found == 8 and isinstance(value, memoryview):
+                at = 0
+                while at < len(value):
+                    packed, at = _varint(value, at)
+                    yield found, _signed(packed)
 
     def has(self, number: int) -> bool:
         """Whether there is a field of that number."""
@@ -143,6 +169,11 @@ def _fields(message: memoryview) -> Iterator[tuple[int, object]]:
         if at > len(message):
             raise IndexError("cut off")
         yield key >> 3, value
+
+
+def _signed(value: int) -> int:
+    """A number as 64 bits hold it."""
+    return value - (1 << 64) if value >> 63 else value
 
 
 def _varint(message: memoryview, at: int) -> tuple[int, int]:
