@@ -57,13 +57,9 @@ def grid() -> PlaceGrid:
 @pytest.fixture(scope="module", params=["grid", "runs", "seqslam", "network"])
 def saved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("maps") / "map"
-    places: Any = PlaceRuns(12, 3) if request.param == "runs" else grid()
     if request.param == "network":
         pytest.importorskip("torch", reason="the network needs the extra 'train'")
-    part = {"grid": "ncc", "runs": "sad", "network": Network(steps=1, batch=4)}.get(
-        request.param, request.param
-    )
-    train(drive(0), places, part).save(folder)
+    saved_as(f"map-{request.param}", folder, drive(1))
     return folder
 
 
@@ -94,6 +90,34 @@ def answers(folder: Path, query: Traverse) -> bytes:
     assert np.isfinite(rows).all()
     figures = evaluate(where, query).figures
     return rows.tobytes() + repr(figures).encode()
+
+
+def saved_as(name: str, folder: Path, query: Traverse) -> tuple[Callable[[Path], object], str]:
+    """A map, a traverse or a result in a new folder; what uses such a folder, and the file that marks it."""
+    if name == "traverse":
+        query.save(folder)
+        street = train(drive(0), grid(), "ncc")
+        return partial(traverse_used, street), "traverse.json"
+    if name == "result":
+        evaluate(Localizer(train(drive(0), grid(), "ncc"), Best()), query).save(folder, with_scores=True)
+        return result_used, "result.json"
+    places: Any = PlaceRuns(12, 3) if name == "map-runs" else grid()
+    parts: dict[str, Any] = {"map-grid": "ncc", "map-runs": "sad", "map-network": Network(steps=1, batch=4)}
+    train(drive(0), places, parts.get(name, "seqslam")).save(folder)
+    return lambda place: answers(place, query), "map.json"
+
+
+def traverse_used(street: PlaceMap, folder: Path) -> object:
+    found = Traverse.load(folder)
+    _ = found.xy, found[2:4].images.sum(), open_traverse(folder)
+    where = Localizer(street, Best())
+    return evaluate(where, street.open(folder)).figures, train(found, PlaceRuns(12, 3), "sad")
+
+
+def result_used(folder: Path) -> object:
+    found = Result.load(folder)
+    _ = found.error_m, found.outcome, found.timing
+    return compare([folder])
 
 
 def test_maps(saved: Path, query: Traverse, tmp_path: Path) -> None:
@@ -161,15 +185,7 @@ def test_traverses(query: Traverse, tmp_path: Path) -> None:
         np.zeros((21, 24), bool),
     )
     masked.save(tmp_path / "saved")
-    street = train(drive(0), grid(), "ncc")
-    count = 0
-
-    def use(folder: Path) -> object:
-        found = Traverse.load(folder)
-        _ = found.xy, found[2:4].images.sum(), open_traverse(folder)
-        where = Localizer(street, Best())
-        return evaluate(where, street.open(folder)).figures, train(found, PlaceRuns(12, 3), "sad")
-
+    count, use = 0, partial(traverse_used, train(drive(0), grid(), "ncc"))
     changes = list(json_alterations(tmp_path / "saved", "traverse.json"))
     for name in ("images", "t_us", "counts", "track", "mask"):
         changes += array_alterations(tmp_path / "saved", f"{name}.npy")
@@ -185,19 +201,13 @@ def test_results(query: Traverse, tmp_path: Path) -> None:
     result = evaluate(Localizer(train(drive(0), grid(), "ncc"), Best()), query)
     result.save(tmp_path / "saved", with_scores=True)
     saved, count = tmp_path / "saved", 0
-
-    def use(folder: Path) -> object:
-        found = Result.load(folder)
-        _ = found.error_m, found.outcome, found.timing
-        return compare([folder])
-
     changes = list(json_alterations(saved, "result.json"))
     for file in sorted(saved.glob("*.npy")):
         changes += array_alterations(saved, file.name)
     changes += [*file_alterations(saved), *csv_alterations(saved)]
     for what, alteration in changes:
         place = altered(saved, tmp_path / "result", alteration)
-        one_line(what, partial(use, place))
+        one_line(what, partial(result_used, place))
         count += 1
     assert count > 100
 

@@ -34,7 +34,7 @@ ORDER = {
     ),
     "evplace.drives": "datasets to_traverse",
     "evplace.scorers": "_search _reduction _compressed _distances _seqslam_images _network",
-    "evplace.scorers._network": "network network_onnx augmentation checkpoint training",
+    "evplace.scorers._network": "network_onnx network augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
     "evplace_lab": "city descriptor reproduction report cli",
 }

@@ -239,6 +239,11 @@ class Localizer:
                 made[part] = self.rows(np.stack([mean for mean, _ in pairs]))
         return made, seen
 
+    def seen_of(self, query: Traverse) -> tuple[list[Seen], Rows]:
+        """What a matcher sees of each image of a traverse, and their rows (n, items), made in blocks."""
+        rows, seen = self._seen_of(query, np.arange(len(query)), "hindsight", None)
+        return seen, rows
+
     def _live(self, rows: Rows, seen: list[Seen]) -> tuple[Path, int]:
         """The answers, and how many images later one was known at most; -1 where none was ever given."""
         known = [Answer(at, -1, np.nan, False) for at in range(len(rows))]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -221,3 +222,54 @@ def test_a_track_that_needs_settings(tmp_path: Path, capsys: Capture) -> None:
     assert json_of(capsys, *command, tmp_path / "odd", *shifted) == plain
     tracks = [np.load(tmp_path / name / "track.npy") for name in ("plain", "odd")]
     np.testing.assert_allclose(*tracks)
+
+
+@pytest.fixture(scope="module")
+def avenue(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A map of 240 m by the default, and the drives of it."""
+    folder = tmp_path_factory.mktemp("avenue")
+    write_drive(folder, "day", make_drive(windows=120))
+    write_drive(folder, "night", make_drive(seed=1, windows=120, noise=0.02))
+    day = ["train", f"{folder}/day.aedat4", "--track", f"{folder}/day.csv", "-o", f"{folder}/avenue.evp"]
+    assert main(day) == 0
+    return folder
+
+
+def test_the_default_finds_the_night_and_says_how_sure_it_is(avenue: Path, capsys: Capture) -> None:
+    assert main(["localize", f"{avenue}/avenue.evp", f"{avenue}/night.aedat4", "--json"]) == 0
+    matches = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert len(matches) == 120
+    assert sum(match["state"] == "localised" for match in matches) > 60
+    assert all(0 <= match["probability"] <= 1 for match in matches)
+    late = ["localize", f"{avenue}/avenue.evp", f"{avenue}/night.aedat4", "--lag-s", "1", "--json"]
+    assert main(late) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 120
+
+
+def test_more_false_accepts_may_be_allowed(avenue: Path, tmp_path: Path, capsys: Capture) -> None:
+    query = ("evaluate", avenue / "avenue.evp", avenue / "night.aedat4", "--track", avenue / "night.csv")
+    strict = json_of(capsys, *query, "-o", tmp_path / "a", "--false-accept", 0.001)
+    loose = json_of(capsys, *query, "-o", tmp_path / "b", "--false-accept", 0.5)
+    assert strict["accuracy"] <= loose["accuracy"]
+    assert loose["within_20_m"] > 0.9
+    assert (tmp_path / "b" / "reliability.png").read_bytes().startswith(b"\x89PNG")
+    assert main([*map(str, query), "-o", f"{tmp_path}/c", "--matcher", "best", "--false-accept", "0.1"]) == 2
+    assert "false_accept" in capsys.readouterr().err
+
+
+def test_calibrate_measures_a_map_anew(avenue: Path, street: Path, tmp_path: Path, capsys: Capture) -> None:
+    shutil.copytree(avenue / "avenue.evp", tmp_path / "map")
+    facts = json_of(capsys, "calibrate", tmp_path / "map")
+    assert facts["matcher"] == "bayes"
+    assert 0 < facts["unknown_live_threshold"] < 1
+    shutil.copytree(street, tmp_path / "short")
+    assert main(["calibrate", f"{tmp_path}/short"]) == 0
+    assert "could not be measured on itself" in capsys.readouterr().err
+
+
+def test_that_nothing_was_accepted_is_said(avenue: Path, tmp_path: Path, capsys: Capture) -> None:
+    query = ["localize", f"{avenue}/avenue.evp", f"{avenue}/night.aedat4"]
+    assert main([*query, "--set", "threshold=1.0"]) == 0
+    told = capsys.readouterr().err
+    assert "none of the 120 matches was accepted" in told
+    assert "--matcher best" in told

@@ -342,6 +342,77 @@ def test_a_second_writer(folder: Path, capsys: Capture) -> None:
     assert "another process" in run.stderr
 
 
+def limited(kilobytes: int, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """A command that may write no more than so many bytes into a file."""
+    import resource
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (kilobytes << 10, kilobytes << 10))
+
+    command = [sys.executable, "-m", "evplace", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, preexec_fn=limit)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows limits no process")
+@pytest.mark.parametrize("suffix", ["h5", "npz", "aedat4", "raw"])
+def test_no_writer_outgrows_the_disk(tmp_path: Path, suffix: str) -> None:
+    rng = np.random.default_rng(0)
+    n = 300_000
+    events = Events.of(
+        np.arange(n) * 9, rng.integers(0, 240, n), rng.integers(0, 180, n), n * [1], (240, 180)
+    )
+    write_recording(tmp_path / "day.aedat4", [events], events.size)
+    run = limited(40, "convert", tmp_path / "day.aedat4", tmp_path / f"x.{suffix}")
+    assert run.returncode == 2
+    assert run.stderr == f"evplace: the disk is full: {tmp_path}/x.{suffix} was not written\n"
+    assert left(tmp_path) == ["day.aedat4"]
+
+
+@pytest.mark.parametrize("command", [["info", "--json"], ["info"], ["doctor"]])
+def test_a_full_standard_output(folder: Path, command: list[str]) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    with Path("/dev/full").open("w") as full:
+        run = subprocess.run(
+            [sys.executable, "-m", "evplace", command[0], folder / "day.aedat4", *command[1:]],
+            stdout=full, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+    assert run.returncode == 2
+    assert run.stderr == "evplace: cannot write to standard output: No space left on device\n"
+
+
+WAITS_HALFWAY = """
+import sys
+from evplace.cli import main
+from evplace.core.storage import GrowingArray
+
+def append(self, item):
+    grow(self, item)
+    print("half", flush=True)
+    sys.stdin.read()
+
+grow, GrowingArray.append = GrowingArray.append, append
+sys.exit(main(sys.argv[1:]))
+"""
+"""A command that says when a part of its output was written, and waits then to be stopped."""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no signals to one process")
+@pytest.mark.parametrize("how", ["SIGTERM", "SIGHUP"])
+def test_being_asked_to_end_leaves_nothing(folder: Path, how: str) -> None:
+    number, pipe = getattr(signal, how), subprocess.PIPE
+    command = [sys.executable, "-c", WAITS_HALFWAY, "images", folder / "day.aedat4", "-o", folder / "x"]
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "half\n"
+        process.send_signal(number)
+        _, message = process.communicate(timeout=HANG_S)
+    assert process.returncode == 128 + number
+    assert message == "evplace: interrupted; nothing half-written was left\n"
+    assert [path.name for path in folder.iterdir() if path.name.startswith(".")] == []
+    assert not (folder / "x").exists()
+
+
 WAITS_ONCE_SAVED = """
 import signal, sys
 from evplace.cli import main

@@ -29,6 +29,7 @@ from evplace.core.storage import (
     read_array,
     read_json,
     sha256,
+    write_array,
     write_json,
 )
 
@@ -54,6 +55,114 @@ def test_a_killed_writer_blocks_nobody_and_leaves_nothing_in_the_next_output(tmp
         file.write_text("whole")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file.txt", "folder"]
     assert [path.name for path in (tmp_path / "folder").iterdir()] == ["whole"]
+
+
+@pytest.mark.parametrize("left", ["partial", "old"])
+def test_what_a_killed_writer_left_of_the_old_output_blocks_nobody(tmp_path: Path, left: str) -> None:
+    """Killed while it removed the old output, or before the new one had its name."""
+    stale = tmp_path / f".out.{'0123456789abcdef'}.{left}"
+    (stale / "inner").mkdir(parents=True)
+    (stale / "mark").write_text("old")
+    for name in ("out", "other"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mark").write_text("new")
+    mine = tmp_path / ".out.mine.partial"
+    mine.write_text("mine")
+    with new_folder(tmp_path / "out", overwrite=True, mark="mark") as folder:
+        (folder / "mark").write_text("newer")
+    assert sorted(path.name for path in tmp_path.iterdir()) == [mine.name, "other", "out"]
+    assert (tmp_path / "out" / "mark").read_text() == "newer"
+
+
+def test_an_old_output_whose_place_was_never_taken_comes_back(tmp_path: Path) -> None:
+    stale = tmp_path / f".out.{'0' * 16}.old"
+    stale.mkdir()
+    (stale / "mark").write_text("old")
+    with pytest.raises(OutputError, match="exists"), new_folder(tmp_path / "out"):
+        pass
+    assert (tmp_path / "out" / "mark").read_text() == "old"
+
+
+@pytest.mark.parametrize("exchanges", [True, False])
+def test_a_folder_is_replaced_in_one_step_where_the_system_can(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, exchanges: bool
+) -> None:
+    if not exchanges:
+        monkeypatch.setattr(storage, "_exchange", lambda *_: False)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mark").write_text("old")
+    with new_folder(tmp_path / "out", overwrite=True, mark="mark") as folder:
+        (folder / "mark").write_text("new")
+    assert (tmp_path / "out" / "mark").read_text() == "new"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows makes links for administrators only")
+@pytest.mark.parametrize("points_to", ["folder", "file", "nowhere"])
+def test_a_link_is_no_output(tmp_path: Path, points_to: str) -> None:
+    """Said before the work; what it points to stays."""
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "mark").write_text("dear")
+    (tmp_path / "file").write_text("dear")
+    (tmp_path / "link").symlink_to(points_to)
+    for refused in (
+        lambda: check_new_folder(tmp_path / "link", True, "mark"),
+        lambda: check_new_file(tmp_path / "link", True),
+        lambda: new_folder(tmp_path / "link", True, "mark").__enter__(),
+        lambda: new_file(tmp_path / "link", True).__enter__(),
+    ):
+        with pytest.raises(OutputError, match=f"is a link to {points_to}|is a folder"):
+            refused()
+    assert (tmp_path / "folder" / "mark").read_text() == (tmp_path / "file").read_text() == "dear"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder", "link"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows makes links for administrators only")
+def test_names_in_a_shared_folder_cannot_be_laid_in_wait(tmp_path: Path) -> None:
+    """Links under the names that a writer uses lead nowhere: the victim stays as it was."""
+    victim = tmp_path / "victim"
+    victim.write_text("dear")
+    for name in (".x.npz.partial", ".x.partial.npz", ".x.npz.old", ".x.partial", ".x.old"):
+        (tmp_path / name).symlink_to(victim)
+    with new_file(tmp_path / "x.npz") as file:
+        file.write_text("new")
+    with new_folder(tmp_path / "x") as folder:
+        (folder / "mark").write_text("new")
+    (tmp_path / ".y.lock").symlink_to(victim)
+    with pytest.raises(OutputError, match="cannot write"), new_file(tmp_path / "y"):
+        pass
+    assert victim.read_text() == "dear"
+    assert not victim.is_symlink()
+
+
+@pytest.mark.parametrize("check", [check_new_file, lambda path, over: check_new_folder(path, over, "mark")])
+def test_a_place_that_takes_nothing_is_told_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: Callable[[Path, bool], None]
+) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OutputError, match=r"file is no folder"):
+        check(tmp_path / "file" / "out", False)
+    check(tmp_path / "none" / "yet" / "out", False)
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(OutputError, match="nothing can be written in"):
+        check(tmp_path / "none" / "yet" / "out", False)
+
+
+def test_arrays_on_a_full_disk_are_one_line(tmp_path: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("this system has no /dev/full")
+    with pytest.raises(OutputError, match="the disk is full"), new_folder(tmp_path / "x"):
+        write_array(Path("/dev/full"), np.zeros((3000, 3)))
+
+
+@pytest.mark.parametrize(
+    "array", [np.float64(3), np.zeros((0, 4)), np.arange(6).reshape(2, 3).T, np.ones(3, bool)]
+)
+def test_arrays_come_back(tmp_path: Path, array: np.ndarray) -> None:
+    write_array(tmp_path / "a.npy", array)
+    got = np.load(tmp_path / "a.npy")
+    assert (got.dtype, got.shape) == (array.dtype, array.shape)
+    np.testing.assert_array_equal(got, array)
 
 
 def test_two_outputs_of_one_name_but_of_two_folders_are_two(tmp_path: Path) -> None:
@@ -108,16 +217,12 @@ def test_the_old_output_stands_until_the_new_one_is_whole(tmp_path: Path) -> Non
 def test_an_output_that_cannot_take_its_name_leaves_the_old_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overwritten: bool
 ) -> None:
-    rename = Path.rename
-
     def refused(path: Path, target: Path) -> Path:
-        if "partial" in path.name:
-            raise OSError(errno.EIO, "Input/output error", str(path))
-        return rename(path, target)
+        raise OSError(errno.EIO, "Input/output error", str(path))
 
     if overwritten:
         (tmp_path / "file").write_text("old")
-    monkeypatch.setattr(Path, "rename", refused)
+    monkeypatch.setattr(Path, "replace", refused)
     with (
         pytest.raises(OutputError, match="cannot write"),
         new_file(tmp_path / "file", overwrite=True) as file,

@@ -98,3 +98,17 @@ def test_what_was_left_out_of_the_log_is_told() -> None:
     assert damaged.state == "bad"
     assert damaged.sentence.startswith("The log is damaged: it breaks off. ")
     assert "slow drift" in found(gps, EVENTS, "GPS fixes", track).sentence
+
+
+@pytest.mark.parametrize(
+    ("reason", "word"),
+    [
+        ("repeated while moving", "static navigation"),
+        ("faster than 70 m/s", "`max_speed_mps`"),
+        ("against the log's own speed", "one receiver"),
+        ("broken row", "lines shown"),
+    ],
+)
+def test_the_advice_fits_the_reason(reason: str, word: str) -> None:
+    track = replace(road(T_S, 8 * T_S), dropped={reason: 50, "no fix": 2})
+    assert word in found(gps, EVENTS, "GPS fixes", track).advice

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from examined import SIZE, noise
+from examined import SIZE, at_times, noise
 
 from evplace.core.events import Events
 from evplace.doctor import Examination, examine
@@ -90,3 +90,19 @@ def test_a_guessed_size_is_remarked(tmp_path: Path) -> None:
     finding = examine(tmp_path / "made.npz").named("remarks")
     assert (finding.state, finding.value) == ("look", 1)
     assert "inferred" in finding.sentence
+
+
+@pytest.mark.parametrize(("suffix", "turn"), [("raw", "16.8 s"), ("aedat4", None)])
+def test_a_silence_may_have_been_a_turn_of_the_clock_longer(
+    suffix: str, turn: str | None, tmp_path: Path
+) -> None:
+    """EVT3 counts 24 bits of microseconds: what it does not write for a turn, nobody can know."""
+    t_us = np.arange(0, 6_000_000, 100)
+    quiet = at_times(t_us[(t_us < 3_000_000) | (t_us >= 3_400_000)])
+    write_recording(tmp_path / f"quiet.{suffix}", [quiet], SIZE)
+    write_recording(tmp_path / f"busy.{suffix}", [at_times(t_us)], SIZE)
+    busy, quiet = (examine(tmp_path / f"{name}.{suffix}").findings for name in ("busy", "quiet"))
+    told = [finding.sentence for finding in quiet if finding.name == "turns of the clock"]
+    assert all(finding.name != "turns of the clock" for finding in busy)
+    assert len(told) == (turn is not None)
+    assert turn is None or f"every {turn}" in told[0]

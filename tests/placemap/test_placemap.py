@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from conftest import make_drive, make_traverse
 from evplace import scorers
 from evplace.core.errors import OutputError, PlaceMapError, SettingsError
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
-from evplace.placemap import PlaceMap, train
+from evplace.matchers.bayes import Bayes
+from evplace.matchers.local import Local
+from evplace.placemap import PlaceMap, calibrate, remembered, train
 from evplace.places import PlaceGrid, PlaceRuns
 
 
@@ -73,3 +77,82 @@ def test_scorers_and_their_settings_are_checked(day: Traverse, places: PlaceGrid
         train(day, places, "nearest")
     with pytest.raises(SettingsError, match="put them into the object"):
         train(day, places, scorers.NCC(), sigma=1)
+
+
+def long_street() -> tuple[Traverse, PlaceGrid]:
+    """240 m: long enough to be measured on itself."""
+    street = make_traverse(make_drive(windows=120))
+    assert street.track is not None
+    return street, PlaceGrid.from_track(street.track)
+
+
+def test_a_map_remembers_its_matcher_and_what_it_learned(tmp_path: Path) -> None:
+    street, places = long_street()
+    learned = train(street, places, "edges", matcher=Bayes(false_accept=0.05))
+    assert learned.learned is not None
+    learned.save(tmp_path / "map")
+    loaded = PlaceMap.load(tmp_path / "map")
+    assert loaded.matcher == Bayes(false_accept=0.05)
+    assert loaded.learned is not None
+    for name, values in learned.learned.items():
+        np.testing.assert_array_equal(loaded.learned[name], values)
+    assert learned.items.t_us is not None
+    assert loaded.items.t_us is not None
+    np.testing.assert_array_equal(loaded.items.t_us, learned.items.t_us)
+    night = make_traverse(make_drive(seed=1, windows=120, noise=0.02))
+    ours, theirs = (list(Localizer(one).match_traverse(night)) for one in (learned, loaded))
+    assert ours == theirs
+    assert {match.state for match in ours} >= {"localised"}
+    assert remembered(tmp_path / "map") == "bayes"
+
+
+def test_what_a_matcher_learned_must_fit_the_map(tmp_path: Path) -> None:
+    street, places = long_street()
+    learned = train(street, places, "edges")
+    learned.save(tmp_path / "map")
+    for name, wrong in (
+        ("matcher-wrong.npy", np.zeros(3)),
+        ("matcher-unknown_live.npy", np.array([0.5, 0.1])),
+        ("times.npy", np.zeros(4, np.int64)),
+    ):
+        kept = (tmp_path / "map" / name).read_bytes()
+        np.save(tmp_path / "map" / name, wrong)
+        sign(tmp_path / "map")
+        with pytest.raises(PlaceMapError, match="damaged"):
+            Localizer(PlaceMap.load(tmp_path / "map"))
+        (tmp_path / "map" / name).write_bytes(kept)
+
+
+def sign(folder: Path) -> None:
+    """Checksums over what lies in the folder now."""
+    (folder / "SHA256SUMS").unlink()
+    sums = [
+        f"{hashlib.sha256(one.read_bytes()).hexdigest()}  {one.name}\n" for one in sorted(folder.iterdir())
+    ]
+    (folder / "SHA256SUMS").write_text("".join(sums), "ascii")
+
+
+def test_the_default_is_the_best_and_the_preset_paper_the_papers(day: Traverse, places: PlaceGrid) -> None:
+    best = train(day, places)
+    assert (best.scorer, best.matcher) == (scorers.Fused(), Bayes())
+    assert best.learned is None  # 120 m are too short
+    pytest.importorskip("torch", reason="the network needs the extra 'train'")
+    paper = train(day, places, preset="paper", steps=1)
+    assert (type(paper.scorer), paper.matcher) == (scorers.Network, Local.presets["paper"])
+    with pytest.raises(SettingsError, match="no preset 'moon'"):
+        train(day, places, preset="moon")
+
+
+def test_a_map_of_places_is_not_measured(network_map: PlaceMap) -> None:
+    assert network_map.matcher == Local()
+    assert calibrate(network_map, Bayes()).learned is None
+    assert list(Localizer(calibrate(network_map, Bayes())).match_traverse(make_traverse(make_drive(1))))
+
+
+@pytest.mark.parametrize("images", [1, 2])
+def test_a_map_of_one_image_or_two(day: Traverse, places: PlaceGrid, images: int) -> None:
+    learned = train(day[:images], places)
+    assert learned.learned is None
+    matches = list(Localizer(learned).match_traverse(day[:10]))
+    assert {match.state for match in matches} == {"localised"}
+    assert all(np.isnan(match.probability) for match in matches)

@@ -80,6 +80,6 @@ def test_the_histogram_is_that_of_a_plain_loop() -> None:
 
 
 def test_settings_that_cannot_be_are_refused() -> None:
-    for wrong in ({"width": 0}, {"orientations": 1}, {"cell": 0}):
+    for wrong in ({"pixels": 0}, {"orientations": 1}, {"cell": 0}):
         with pytest.raises(SettingsError, match="settings of edges"):
             Edges(**wrong)

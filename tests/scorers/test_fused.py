@@ -88,7 +88,7 @@ def test_content_that_does_not_fit_is_refused(day: Traverse, places: PlaceGrid) 
 
 
 def test_settings_that_cannot_be_are_refused() -> None:
-    for wrong in ({"every_m": -1.0}, {"components": 0}):
+    for wrong in ({"every_m": -1.0}, {"components": 1}):
         with pytest.raises(SettingsError, match="settings of fused"):
             Fused(**wrong)
 

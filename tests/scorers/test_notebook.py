@@ -10,7 +10,9 @@ import pytest
 from evplace.core.errors import PlaceMapError
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
-from evplace.placemap import PlaceMap
+from evplace.placemap import PlaceMap, train
+from evplace.places import PlaceGrid
+from evplace.scorers.network import Network
 from evplace.scorers.notebook import Notebook
 
 pytest.importorskip("torch", reason="the network needs the extra 'train'")
@@ -23,6 +25,16 @@ def reading(place_map: PlaceMap, batch_statistics: bool, dropout: float) -> Loca
 def test_with_neither_habit_it_is_the_network(network_map: PlaceMap, night: Traverse) -> None:
     plain = Localizer(network_map, "best").rows(night.images)
     np.testing.assert_allclose(reading(network_map, False, 0.0).rows(night.images), plain, atol=1e-5)
+
+
+def test_a_tuned_network_is_read_as_it_was_trained(day: Traverse, places: PlaceGrid, night: Traverse) -> None:
+    tuned = dataclasses.replace(Network.presets["tuned"], steps=3, batch=8)
+    learned = train(day, places, tuned)
+    reader = dataclasses.replace(learned, scorer=Notebook(False, 0.0, tuned))
+    wanted = Localizer(reader, "best").rows(night.images)
+    np.testing.assert_allclose(Localizer(learned, "best").rows(night.images), wanted, atol=1e-5)
+    unscaled = dataclasses.replace(learned, scorer=Notebook(False, 0.0))
+    assert not np.allclose(Localizer(unscaled, "best").rows(night.images), wanted, atol=1e-3)
 
 
 def test_answers_depend_on_who_is_asked_together(network_map: PlaceMap, night: Traverse) -> None:

@@ -8,10 +8,15 @@ damaged recording's good part was used. Errors that evplace raises on purpose ar
 from __future__ import annotations
 
 import ast
+import contextlib
 import difflib
+import errno
 import importlib
 import os
+import signal
 import sys
+import threading
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -20,24 +25,72 @@ from evplace.cli._output import note
 from evplace.core import families
 from evplace.core.errors import EvplaceError, PartError
 
-INTERRUPTED = 130
+NO_OUTPUT = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
+"""How the system says that nothing more can be printed."""
+SIGNALED = 128
+"""Added to a signal's number, this is the exit code of what it ended, as shells have it."""
+
+
+class _Stopped(KeyboardInterrupt):
+    """The system, or whoever closes the terminal, asks for an end, as Ctrl-C does."""
+
+    def __init__(self, number: int = signal.SIGINT) -> None:
+        super().__init__()
+        self.number = number
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one command; returns the exit code."""
     arguments = sys.argv[1:] if argv is None else argv
     try:
-        return _run(arguments)
+        with _stoppable():
+            code = _run(arguments)
+            if sys.stdout is not None:
+                sys.stdout.flush()
+        return code
     except EvplaceError as error:
         note(str(error))
         return 2
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         note("interrupted; nothing half-written was left")
-        return INTERRUPTED
+        return SIGNALED + (stop.number if isinstance(stop, _Stopped) else signal.SIGINT)
     except BrokenPipeError:
         # The reader of our output has gone (`evplace ... | head`): that is no fault.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
         return 0
+    except OSError as error:
+        if error.filename is not None or error.errno not in NO_OUTPUT:
+            raise
+        _print_no_more()
+        note(f"cannot write to standard output: {error.strerror}")
+        return 2
+
+
+@contextlib.contextmanager
+def _stoppable() -> Iterator[None]:
+    """Within the block, being asked to end is as Ctrl-C is: what was half-written goes."""
+
+    def stop(number: int, _: object) -> None:
+        for each in numbers:  # the end is on its way: it is not asked for twice
+            signal.signal(each, signal.SIG_IGN)
+        raise _Stopped(number)
+
+    known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    is_main = threading.current_thread() is threading.main_thread()
+    # What nohup has it pass over is passed over.
+    numbers = [number for number in known if is_main and signal.getsignal(number) is signal.SIG_DFL]
+    for number in numbers:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number in numbers:
+            signal.signal(number, signal.SIG_DFL)
+
+
+def _print_no_more() -> None:
+    """Let what is still to be printed vanish, as Python writes it when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def commands() -> dict[str, str]:

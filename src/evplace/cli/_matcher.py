@@ -43,7 +43,7 @@ def note_matches(where: Localizer, matches: int, accepted: int) -> None:
         note(NOT_MEASURED)
     if matches and not accepted:
         note(
-            f"none of the {matches} matches was accepted: the drive may be of another road or sensor than the "
-            f"map, or the matcher '{where.settings['name']}' asks for too much; --matcher best accepts all, "
-            "--false-accept 0.1 more"
+            f"none of the {matches} matches was accepted: the drive may be of another road or sensor than "
+            f"the map, or the matcher '{where.settings['name']}' asks for too much; --matcher best accepts "
+            "all, --false-accept 0.1 more"
         )

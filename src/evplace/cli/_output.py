@@ -79,8 +79,9 @@ def print_facts(title: str, facts: Mapping[str, object]) -> None:
 
 
 def note(text: str) -> None:
-    """A remark beside the answer: one line on standard error."""
-    print(f"evplace: {in_flags(' '.join(text.splitlines()))}", file=sys.stderr)
+    """A remark beside the answer: one line on standard error, where there is any."""
+    with contextlib.suppress(OSError):
+        print(f"evplace: {in_flags(' '.join(text.splitlines()))}", file=sys.stderr, flush=True)
 
 
 def note_guesses(notes: object) -> None:

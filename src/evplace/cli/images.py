@@ -35,6 +35,9 @@ from evplace.imaging.traverse import Traverse, TraverseWriter, new_traverse
 from evplace.imaging.windows import WindowSettings
 from evplace.sources.cleaning import CleaningSettings
 
+MOST_BYTES = 10**9
+"""Bytes of images that are written unasked."""
+
 
 @dataclass(frozen=True)
 class Args(TrackFlags, RecordingFlags):
@@ -63,6 +66,8 @@ class Args(TrackFlags, RecordingFlags):
     spacing: Annotated[SpacingSettings, tyro.conf.arg(name="")] = field(default_factory=SpacingSettings)
     mask: Path | None = None
     """Pixels to leave out: a text file of x,y lines, or a .npy file (a mask.npy of a traverse will do)."""
+    yes: bool = False
+    """Write the images even where they come to more than 1 GB."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -82,6 +87,7 @@ def run(args: Args) -> int:
     if args.sheet is not None:
         check_new_file(args.sheet, args.overwrite)
     with new_traverse(args.out, {}, args.overwrite) as writer:
+        writer.most_bytes = None if args.yes else MOST_BYTES
         fault = _record(args, writer)
     traverse = Traverse.load(args.out)
     if args.sheet is not None:
@@ -104,6 +110,8 @@ def run(args: Args) -> int:
     else:
         print_facts(str(args.out), facts)
     note_guesses(traverse.info.get("notes"))
+    if len(traverse) == 1:
+        note("there is one image only, of the whole recording: a shorter --dt makes more")
     if fault is not None:
         note(f"{fault}; the good part was written")
     return USED_GOOD_PART if fault is not None else 0

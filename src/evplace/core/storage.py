@@ -1,17 +1,22 @@
-"""Outputs appear whole or not at all: a temporary name in the same folder, fsync, rename.
+"""Outputs appear whole or not at all: a temporary name in the same folder, fsync, one rename.
 
 While an output is being written it is locked; a second writer is refused at once. The lock is an
-operating-system file lock: it dies with its process, so a killed writer blocks nobody.
+operating-system file lock: it dies with its process, so a killed writer blocks nobody. Temporary names cannot
+be guessed, so that nobody can lay a link under them in a folder that is shared; what a killed writer left
+under one goes when the same output is written again.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
 import hashlib
 import json
 import math
 import os
+import re
+import secrets
 import shutil
 import sys
 from collections.abc import Iterator
@@ -23,20 +28,24 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import InputError, OutputError
 
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_HERE, _EXCHANGE = -100, 2
+"""Of Linux: paths count from the current folder (AT_FDCWD); two names change places (RENAME_EXCHANGE)."""
+
 
 @contextlib.contextmanager
 def new_folder(path: str | Path, overwrite: bool = False, mark: str = "") -> Iterator[Path]:
     """A temporary folder beside `path` that takes its name when the block ends well, else vanishes.
 
     `overwrite` replaces a folder that was written as this one is: one that is empty, or holds a file
-    called `mark` (which may have wildcards). Raises OutputError where `path` exists otherwise, another
-    process is writing it, or the disk is full.
+    called `mark` (which may have wildcards). Raises OutputError where `path` exists otherwise or is a link,
+    another process is writing it, or the disk is full.
     """
     target = named(path)
-    partial = target.with_name(f".{target.name}.partial")
-    with _explained(target, partial), locked(target):
+    partial = _temporary(target.name, target)
+    with _explained(target), locked(target):
+        _clean(target.name, target)
         check_new_folder(target, overwrite, mark)
-        shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir()
         try:
             yield partial
@@ -44,7 +53,7 @@ def new_folder(path: str | Path, overwrite: bool = False, mark: str = "") -> Ite
                 _fsync(file)
             _replace(target, partial)
         finally:
-            shutil.rmtree(partial, ignore_errors=True)
+            _remove(partial)
 
 
 @contextlib.contextmanager
@@ -54,13 +63,15 @@ def new_file(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
     `overwrite` replaces a file, never a folder. Raises OutputError as `new_folder` does.
     """
     target = named(path)
-    partial = target.with_name(f".{target.stem}.partial{target.suffix}")
-    with _explained(target, partial), locked(target):
+    partial = _temporary(target.stem, target, target.suffix)
+    with _explained(target), locked(target):
+        _clean(target.stem, target, target.suffix)
         check_new_file(target, overwrite)
         try:
             yield partial
             _fsync(partial)
-            _replace(target, partial)
+            partial.replace(target)
+            _fsync(target.parent)
         finally:
             partial.unlink(missing_ok=True)
 
@@ -70,7 +81,7 @@ def check_new_folder(path: str | Path, overwrite: bool, mark: str) -> None:
     target = named(path)
     _refuse_existing(target, overwrite)
     if not target.exists():
-        return
+        return _check_place(target)
     if not target.is_dir():
         raise OutputError(f"{target} is a file, which no folder replaces: choose another name, or remove it")
     if any(target.iterdir()) and not (mark and any(target.glob(mark))):
@@ -78,6 +89,7 @@ def check_new_folder(path: str | Path, overwrite: bool, mark: str) -> None:
             f"{target} holds other things than what is to be written there (no {mark or 'sign of it'}), and "
             "is not replaced: choose another name, or remove it yourself"
         )
+    return _check_place(target)
 
 
 def check_new_file(path: str | Path, overwrite: bool) -> None:
@@ -86,6 +98,7 @@ def check_new_file(path: str | Path, overwrite: bool) -> None:
     if target.is_dir():
         raise OutputError(f"{target} is a folder, which no file replaces: choose the name of a file")
     _refuse_existing(target, overwrite)
+    _check_place(target)
 
 
 def named(path: str | Path) -> Path:
@@ -102,7 +115,7 @@ def locked(target: Path) -> Iterator[None]:
     lock = named(target).with_name(f".{target.name}.lock")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle = os.open(lock, os.O_RDWR | os.O_CREAT, 0o644)
+        handle = os.open(lock, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
     except OSError as error:
         raise OutputError(f"cannot write {target}: {error.strerror or error}") from error
     try:
@@ -124,6 +137,14 @@ def write_json(path: Path, value: object) -> None:
     path.write_text(json.dumps(value, indent=1, allow_nan=False) + "\n", "utf-8")
 
 
+def write_array(path: Path, array: NDArray[Any]) -> None:
+    """A .npy file; unlike numpy's own writing, its error on a full disk is one that says so."""
+    rows = np.ascontiguousarray(array).reshape(np.shape(array))
+    with path.open("wb") as file:
+        _write_header(file, rows.dtype, rows.shape)
+        file.write(rows.data)
+
+
 def read_bytes(path: Path, what: str) -> bytes:
     """The bytes of a file; InputError, naming `what` it should be, where there is none, or a device."""
     try:
@@ -131,6 +152,11 @@ def read_bytes(path: Path, what: str) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot read {what}: {path}: {error.strerror}") from error
+
+
+def is_stream(path: Path) -> bool:
+    """Whether it is a pipe, a socket or a device, which may block for ever, or never end."""
+    return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def read_json(path: Path, what: str) -> dict[str, Any]:
@@ -179,9 +205,7 @@ class GrowingArray:
             self._file.close()
 
     def _write_header(self) -> None:
-        shape = (self._length, *self._item_shape)
-        header = {"descr": self._dtype.str, "fortran_order": False, "shape": shape}
-        np.lib.format.write_array_header_1_0(self._file, header)
+        _write_header(self._file, self._dtype, (self._length, *self._item_shape))
 
 
 def read_array(path: str | Path, what: str, memory_mapped: bool = False) -> NDArray[Any]:
@@ -217,43 +241,86 @@ def _finite(text: str) -> float:
 
 def _refuse_device(path: Path, what: str) -> None:
     """InputError for a pipe or a device, which would be read for ever."""
-    if path.exists() and not (path.is_file() or path.is_dir()):
+    if is_stream(path):
         raise InputError(f"cannot read {what}: {path} is no file")
 
 
 def _refuse_existing(target: Path, overwrite: bool) -> None:
+    if target.is_symlink():
+        raise OutputError(f"{target} is a link to {target.readlink()}: give the name of what it points to")
     if target.exists() and not overwrite:
         raise OutputError(f"{target} exists: choose another name, remove it, or add `overwrite=True`")
 
 
-def _replace(target: Path, partial: Path) -> None:
-    """Give `partial` the name of `target`; what stood there goes only once the new one is in its place."""
-    old = target.with_name(f".{target.name}.old")
-    if target.exists():
-        target.rename(old)
-    try:
-        partial.rename(target)
-    except OSError:
-        if old.exists():
-            old.rename(target)
-        raise
-    _fsync(target.parent)
-    if old.is_dir():
-        shutil.rmtree(old)
+def _check_place(target: Path) -> None:
+    """OutputError where the folder that an output is to stand in, or the nearest that exists, takes none."""
+    place = next(folder for folder in target.absolute().parents if folder.exists())
+    if not place.is_dir():
+        raise OutputError(f"cannot write {target}: {place} is no folder")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise OutputError(f"cannot write {target}: nothing can be written in {place}")
+
+
+def _temporary(begin: str, target: Path, end: str = "") -> Path:
+    """A name beside an output that nobody can guess, by which it is known as its own."""
+    return target.with_name(f".{begin}.{secrets.token_hex(8)}.partial{end}")
+
+
+def _clean(begin: str, target: Path, end: str = "") -> None:
+    """Remove what a killed writer of this output left; an old output that it was replacing comes back."""
+    left = re.compile(rf"\.{re.escape(begin)}\.[0-9a-f]{{16}}\.(partial|old){re.escape(end)}")
+    for path in sorted(target.parent.iterdir()):
+        if left.fullmatch(path.name):
+            if path.suffix == ".old" and not os.path.lexists(target):
+                path.rename(target)
+            else:
+                _remove(path)
+
+
+def _remove(path: Path) -> None:
+    """A folder with all in it, a file, or a link, but not what it points to."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
     else:
-        old.unlink(missing_ok=True)
+        path.unlink(missing_ok=True)
+
+
+def _replace(target: Path, partial: Path) -> None:
+    """Give the folder `partial` the name of `target`; what stood there takes its place."""
+    if not target.exists():
+        partial.rename(target)
+    elif not _exchange(target, partial):
+        old = partial.with_suffix(".old")
+        target.rename(old)
+        try:
+            partial.rename(target)
+        except OSError:
+            old.rename(target)
+            raise
+        _remove(old)
+    _fsync(target.parent)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Have two names change places, in one step; False where the system or the disk cannot."""
+    rename = getattr(ctypes.CDLL(None), "renameat2", None) if sys.platform == "linux" else None
+    return rename is not None and rename(_HERE, bytes(one), _HERE, bytes(other), _EXCHANGE) == 0
+
+
+def _write_header(file: Any, kind: np.dtype[Any], shape: tuple[int, ...]) -> None:
+    header = {"descr": np.lib.format.dtype_to_descr(kind), "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(file, header)
 
 
 @contextlib.contextmanager
-def _explained(target: Path, partial: Path) -> Iterator[None]:
+def _explained(target: Path) -> Iterator[None]:
     """Turn the system's errors of writing `target` into ours; others pass, for they are not about it."""
     try:
         yield
     except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        if error.errno in _FULL:
             raise OutputError(f"the disk is full: {target} was not written") from error
-        names = str(error.filename or "")
-        if names.startswith((str(partial), str(target.parent))):
+        if str(error.filename or "").startswith(str(target.parent)):
             raise OutputError(f"cannot write {target}: {error.strerror or error}") from error
         raise
 

@@ -16,7 +16,18 @@ LEAP_M = 20.0
 """A shorter step is no jump: noise, or one cell of the map."""
 AROUND = 5
 """Steps before and after by which a step is judged."""
-UNSEEN = "A slow drift of the positions leaves no trace in a log: it is not checked."
+UNSEEN = "A slow drift shows only against a speed and course of the log's own: else it is not checked."
+ADVICE = {
+    "no fix": "keep the receiver in the open and wait for its fix before driving off",
+    "repeated": "have the receiver hold no position while it moves (static navigation off), and in the open",
+    "faster": "keep the aerial off walls, which reflect; `max_speed_mps` says how fast the vehicle goes",
+    "against": "keep the aerial off walls, which reflect; take speed, course and position of one receiver",
+    "of a clock": "have the clock set before the log begins, and by GPS time",
+    "of the other side": "see on a map which side of the leap is right",
+    "duplicate": "let one program alone write the log, each fix once",
+}
+"""Beginning of a reason why fixes were left out -> what to do."""
+ELSE = "look at the lines shown: they are of no use as they are"
 
 
 class Check(AtTheEnd):
@@ -46,9 +57,9 @@ def _quality(track: Track) -> Finding:
         return Finding("GPS fixes", "good", 0.0, "% unusable", f"{sentence}; all can be used. {UNSEEN}")
     reasons = ", ".join(f"{number:,} {reason}" for reason, number in track.dropped.items())
     state: State = "good" if share < 1 else "look" if share < 20 else "bad"
-    advice = (
-        "" if state == "good" else "keep the receiver in the open and wait for its fix before driving off"
-    )
+    most = max(track.dropped, key=lambda reason: track.dropped[reason])
+    fit = next((ADVICE[begin] for begin in ADVICE if most.startswith(begin)), ELSE)
+    advice = "" if state == "good" else fit
     return Finding(
         "GPS fixes", state, share, "% unusable", f"{sentence}; left out: {reasons}. {UNSEEN}", advice
     )

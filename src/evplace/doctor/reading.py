@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from evplace.core.errors import DoubtfulRecordingError, UnsupportedError
-from evplace.doctor._outcome import Finding, Outcome, State
+from evplace.doctor._outcome import Finding, Outcome, State, counted
 from evplace.doctor._subject import AtTheEnd, Subject
 
 OF = ("events", "frames")
@@ -42,8 +42,25 @@ class Check(AtTheEnd):
                     "nothing, if they are few; else check the camera's link and record anew",
                 ),
                 _clock(recording.wraps, recording.back_us, dropped["backwards"], total),
+                *self._turns(recording.turn_us),
             ]
         )  # fmt: skip
+
+    def _turns(self, turn_us: int) -> list[Finding]:
+        """Silences that may have been a turn of the file's clock longer, where that has one."""
+        starts, ends = self._subject.gaps()
+        if not turn_us or not len(starts):
+            return []
+        longest, turn_s = float((ends - starts).max()) / 1e6, turn_us / 1e6
+        return [
+            Finding(
+                "turns of the clock", "look", longest, "s",
+                f"The file's clock starts anew every {turn_s:,.1f} s, and the whole sensor is silent "
+                f"{counted(len(starts), 'time', 'times')}, for up to {longest:.3f} s: each silence may have "
+                "lasted any number of turns longer, which the file does not tell.",
+                "hold the recording's length against a watch, or against its track",
+            )
+        ]  # fmt: skip
 
 
 def _read(subject: Subject) -> Finding:

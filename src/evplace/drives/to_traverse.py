@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
@@ -23,7 +24,7 @@ from evplace.core.events import Size
 from evplace.core.settings import make, to_dict
 from evplace.drives import datasets
 from evplace.drives.datasets import Drive
-from evplace.imaging.images import frame_image
+from evplace.imaging.images import Imager, frame_image
 from evplace.imaging.recipe import OF_EVENTS, Kind, Recipe, shown
 from evplace.imaging.spacing import Spacer, SpacingSettings
 from evplace.imaging.stream import EventImages, images_of
@@ -37,6 +38,11 @@ from evplace.sources.tracks import Track, open_track
 from evplace.sources.tracks._apart import apart, on_day_of
 
 T = TypeVar("T")
+
+FAST = 5_000_000
+"""Bytes of images a second of the drive from which on their number is foretold."""
+FORETOLD = 4_000_000
+"""Events from which it is."""
 
 
 class Reading(NamedTuple):
@@ -173,6 +179,8 @@ def _record_events(
     recipe.require_same(asked, str(recording.path), "the images asked for", "they cannot be made of it")
     spacer = Spacer(spacing, track)
     writer.recipe = recipe
+    if isinstance(recording, Recording) and spacer.settings == SpacingSettings():
+        _foretell(recording, recipe, writer)
     writer.mask = pixel_mask(recording.packets(), recording.size, recipe.cleaning, mask)
     stream = EventImages(recording.size, recipe, writer.mask)
     packets = _GoodPart(recording.packets())
@@ -193,6 +201,25 @@ def _record_events(
     if isinstance(recording, SimulatedRecording):
         writer.info["simulated"] = to_dict(recording.sensor) | {"seed": recording.seed}
     return _fault(writer)
+
+
+def _foretell(recording: Recording, recipe: Recipe, writer: TraverseWriter) -> None:
+    """OutputError before any image is made, where all would come to more than the writer may take.
+
+    Only images that come fast are foretold, from the first events: the usual ones are not worth the time.
+    """
+    image_bytes, seconds = Imager(recording.size, recipe.images).image(0).nbytes, recipe.windows.seconds
+    if writer.most_bytes is None or image_bytes < FAST * seconds or recipe.windows.count:
+        return
+    first_us, last_us, events, more = None, 0, 0, "in all"
+    with contextlib.suppress(DamagedRecordingError, UnsupportedError):  # raised when they are made
+        for packet in recording.packets():
+            first_us = int(packet.t_us[0]) if first_us is None else first_us
+            events, last_us = events + len(packet), int(packet.t_us[-1])
+            if events > FORETOLD:
+                more = f"for the first {(last_us - first_us) / 1e6:,.1f} s alone"
+                break
+    writer.allow(int((last_us - (first_us or 0)) / 1e6 / seconds) + 1, image_bytes, more)
 
 
 def _record_frames(

@@ -109,7 +109,7 @@ class Result:
             }
             for name, array in arrays.items():
                 if array is not None:
-                    np.save(folder / f"{name}.npy", array)
+                    storage.write_array(folder / f"{name}.npy", array)
 
     @classmethod
     def load(cls, path: str | Path) -> Result:

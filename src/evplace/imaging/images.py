@@ -22,6 +22,11 @@ from evplace.imaging._resampling import Resampler, Resize, axis_map
 from evplace.imaging.representations import Representation
 from evplace.imaging.tones import Tone, toned
 
+MOST = {"width": 1 << 13, "height": 1 << 13, "saturation": 1 << 31, "tau_ms": 1e9, "bins": 1 << 8}
+"""What settings of images go up to: sensors have fewer pixels, and an image must fit into memory."""
+MOST_NUMBERS = 1 << 25
+"""Numbers that an image has at most."""
+
 
 @dataclass(frozen=True)
 class ImageSettings:
@@ -61,11 +66,16 @@ class ImageSettings:
             raise SettingsError(
                 f"the setting 'crop_bottom' cannot be {self.crop_bottom}: it takes 0 to below 1"
             )
-        for name in ("width", "height", "saturation", "tau_ms", "bins"):
-            if not getattr(self, name) > 0:
+        for name, most in MOST.items():
+            if not 0 < getattr(self, name) <= most:
                 raise SettingsError(
-                    f"the setting '{name}' cannot be {getattr(self, name)}: it must be above 0"
+                    f"the setting '{name}' cannot be {getattr(self, name)}: it takes above 0, up to {most:,}"
                 )
+        if self.width * self.height * self.bins > MOST_NUMBERS:
+            raise SettingsError(
+                f"images of {self.width}x{self.height} in {self.bins} bins are too large: 'width', 'height' "
+                f"and 'bins' make up to {MOST_NUMBERS:,} numbers"
+            )
 
     @property
     def used(self) -> tuple[str, ...]:

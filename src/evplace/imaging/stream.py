@@ -33,6 +33,7 @@ class EventImages:
         self._cleaner = Cleaner(size, recipe.cleaning, mask)
         self._windows = open_windows(recipe.windows)
         self._imager = Imager(size, recipe.images)
+        self._last_us: int | None = None
 
     @property
     def cleaned(self) -> dict[str, int]:
@@ -40,7 +41,12 @@ class EventImages:
         return self._cleaner.dropped
 
     def push(self, events: Events) -> Iterator[EventImage]:
-        """The images of all windows that `events` bring to their end."""
+        """The images of all windows that `events` bring to their end.
+
+        InputError where they are no packet, or come before those pushed already.
+        """
+        events.check(self._last_us)
+        self._last_us = int(events.t_us[-1]) if len(events) else self._last_us
         for piece, window in self._windows.push(self._cleaner.push(events)):
             self._imager.add(piece)
             if window is not None:

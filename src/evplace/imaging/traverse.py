@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import InputError, SettingsError, TraverseError
-from evplace.core.storage import GrowingArray, new_folder, read_array, read_json, write_json
+from evplace.core.errors import InputError, OutputError, SettingsError, TraverseError
+from evplace.core.storage import GrowingArray, new_folder, read_array, read_json, write_array, write_json
 from evplace.imaging.recipe import Recipe
 from evplace.sources.tracks import Track
 
@@ -156,6 +156,8 @@ class TraverseWriter:
         """(H, W) True at the pixels whose events were left out."""
         self.recipe: Recipe | None = None
         """How the images are made."""
+        self.most_bytes: int | None = None
+        """Bytes that the images may take; None for any number."""
         self.info = dict(info)
         """Saved at the end."""
         self.t_us: list[int] = []
@@ -165,22 +167,34 @@ class TraverseWriter:
         self._images: GrowingArray | None = None
 
     def add(self, image: NDArray[np.uint8], t_us: int, count: int = -1) -> None:
-        """Add an image (h, w) or (h, w, C), its time and its count of events (-1 for a camera image)."""
+        """Add an image (h, w) or (h, w, C), its time and its count of events (-1 for a camera image).
+
+        OutputError where the images come to more than `most_bytes`.
+        """
+        self.allow(len(self.t_us) + 1, image.nbytes)
         if self._images is None:
             self._images = GrowingArray(self._folder / "images.npy", np.uint8, image.shape)
         self._images.append(image)
         self.t_us.append(t_us)
         self._counts.append(count)
 
+    def allow(self, images: int, bytes_each: int, more: str = "and more may come") -> None:
+        """OutputError where so many images come to more than `most_bytes`, with how many there are."""
+        if self.most_bytes is not None and images * bytes_each > self.most_bytes:
+            raise OutputError(
+                f"{images:,} images of {bytes_each:,} bytes are {images * bytes_each / 1e9:,.1f} GB, {more}: "
+                "`yes` writes them all; a longer 'dt', or 'every_m', makes fewer"
+            )
+
     def close(self) -> None:
         """Write what is left; TraverseError where no image came."""
         if self._images is None:
             raise TraverseError("no image came: the recording holds no events, or the folder no images")
         self._images.close()
-        np.save(self._folder / "t_us.npy", np.array(self.t_us, np.int64))
-        np.save(self._folder / "counts.npy", np.array(self._counts, np.int64))
+        write_array(self._folder / "t_us.npy", np.array(self.t_us, np.int64))
+        write_array(self._folder / "counts.npy", np.array(self._counts, np.int64))
         if self.mask is not None:
-            np.save(self._folder / "mask.npy", self.mask)
+            write_array(self._folder / "mask.npy", self.mask)
         zone = None
         if self.track is not None:
             _save_track(self._folder, self.track)
@@ -218,7 +232,7 @@ def _save_track(folder: Path, track: Track) -> None:
         track.northing,
         track.heading_deg,
     )
-    np.save(folder / "track.npy", np.stack(list(columns), axis=1))
+    write_array(folder / "track.npy", np.stack(list(columns), axis=1))
 
 
 def _load_track(folder: Path, t_us: NDArray[np.int64], zone: Any, what: str) -> Track | None:

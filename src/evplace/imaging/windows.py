@@ -8,6 +8,7 @@ window by Eq. 4; it is put into window 1.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
@@ -20,6 +21,8 @@ from evplace.core.errors import RecordingError, SettingsError
 from evplace.core.events import Events
 
 MICROSECONDS = 1_000_000
+LONGEST_S = 86_400
+_SECONDS = re.compile(r"[0-9]{0,12}(\.[0-9]{0,18})?([eE][+-]?[0-9]{1,2})?(/[0-9]{1,12})?")
 MOST_EMPTY = 100_000
 """Windows without events, one after another, that are still believed: half an hour at 1/60 s."""
 
@@ -42,13 +45,16 @@ class WindowSettings:
     def seconds(self) -> Fraction:
         """dt as an exact fraction of seconds."""
         try:
-            seconds = Fraction(self.dt)
+            # Bounded before it is computed with: 1e999999999 would be.
+            seconds = Fraction(self.dt if _SECONDS.fullmatch(self.dt) else "none")
         except (ValueError, ZeroDivisionError):
             raise SettingsError(
                 f"the setting 'dt' cannot be '{self.dt}': write seconds as 1/30 or 0.05"
             ) from None
-        if seconds * MICROSECONDS < 1:
-            raise SettingsError(f"the setting 'dt' cannot be '{self.dt}': it takes a microsecond or more")
+        if not 1 <= seconds * MICROSECONDS <= LONGEST_S * MICROSECONDS:
+            raise SettingsError(
+                f"the setting 'dt' cannot be '{self.dt}': it takes a microsecond or more, up to a day"
+            )
         return seconds
 
 

@@ -17,6 +17,10 @@ Floats = NDArray[np.float64]
 
 OTHERS = 5
 """Runners-up that are named, at most."""
+HELD = 1e-6
+"""Belief below this is none."""
+NOTABLE = 0.01
+"""A runner-up has at least this share of the belief of the likeliest item."""
 LIKELY = 0.68
 """Share of the belief that the uncertainty holds."""
 
@@ -48,20 +52,25 @@ class Reader:
         """Radius around the item that holds LIKELY of the belief; NaN where items have no positions."""
         if not self.ways.in_metres:
             return math.nan
-        away, held = self.ways.away(item), np.flatnonzero(belief > 1e-6)
-        order = held[np.argsort(away[held])]
-        share = np.cumsum(belief[order])
-        return float(away[order[np.searchsorted(share, LIKELY * share[-1])]]) if len(order) else math.nan
+        held = np.flatnonzero(belief > HELD)
+        if not len(held):
+            return math.nan
+        away = np.hypot(*(self.ways.xy[held] - self.ways.xy[item]).T)
+        order = np.argsort(away)
+        share = np.cumsum(belief[held[order]])
+        return float(away[order[np.searchsorted(share, LIKELY * share[-1])]])
 
     def others(self, belief: Floats, item: int) -> list[tuple[int, float]]:
         """The next best items at other places, and the belief around each."""
-        left = belief.copy()
+        held = np.flatnonzero(belief > max(HELD, NOTABLE * float(belief.max())))
+        xy, left = self.ways.xy[held], belief[held]
         found: list[tuple[int, float]] = []
-        last = item
+        here = self.ways.xy[item]
         for _ in range(OTHERS):
-            left[self.ways.away(last) <= self._reach[3]] = 0.0
-            last = int(left.argmax())
-            if left[last] <= 1e-6:
+            left[np.hypot(*(xy - here).T) <= self._reach[3]] = 0.0
+            if not left.any():
                 break
-            found.append((last, float(left[self.ways.away(last) <= self._reach[0]].sum())))
+            best = int(left.argmax())
+            here = xy[best]
+            found.append((int(held[best]), float(left[np.hypot(*(xy - here).T) <= self._reach[0]].sum())))
         return found

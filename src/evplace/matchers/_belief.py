@@ -35,11 +35,13 @@ BELIEVED = 20
 """For how many of them what the map's own images show is taken."""
 LONGEST_REST_S = 120.0
 """A camera that shows little for longer is taken to show no more."""
+FAR_APART_S = 0.5
+"""Images so far apart do not tell whether the camera stood between them."""
 CHANGE = 0.1
 """Share of a class that becomes the next slower or faster one in a tick."""
 LINK = 0.02
 """Share that passes to references beside in a tick."""
-JUMP = 0.01
+JUMP = 0.003
 """Share that may be anywhere after a tick."""
 
 
@@ -161,7 +163,7 @@ class Clock:
 
     def _active(self, content: float, seconds: float) -> float:
         """From 0, standing, to 1, also where it is not known."""
-        if math.isnan(content):
+        if math.isnan(content) or seconds >= FAR_APART_S:
             return 1.0
         usual = float(np.median(self._shown)) if len(self._shown) >= 5 else content
         active = min(max((content / usual - 0.3) / 0.3, 0.0), 1.0) if usual > 0 else 1.0

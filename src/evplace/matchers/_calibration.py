@@ -38,7 +38,10 @@ SHORTEST_M = 150.0
 LEAST_ITEMS = 50
 LEAST_UNKNOWN = 100
 """Images from places cut out, at least, for a share of them to be told."""
-TRIALS = 6
+TRIALS = (4, 24)
+"""Ways to cut a map, of a large one and of a small one."""
+TRIED = 6000
+"""Images that are localised in all trials, about."""
 MOST_IMAGES = 3000
 """Of the map's own, that are localised on it: the first ones of a longer map."""
 
@@ -72,7 +75,7 @@ def _elsewhere(ways: Ways, item: int) -> Bools:
 def _cuts(ways: Ways) -> Iterator[Bools]:
     """(items,) each time, which are left in the map: every other of stretches drawn anew."""
     rng = np.random.default_rng(0)
-    for trial in range(TRIALS):
+    for trial in range(int(np.clip(TRIED // len(ways.way), *TRIALS))):
         ends = [0.0]
         while ends[-1] < ways.way[-1]:
             ends.append(ends[-1] + rng.uniform(*CUT_M))

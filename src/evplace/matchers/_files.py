@@ -21,6 +21,8 @@ def open_scores(path: FilePath) -> NDArray[Any]:
 
     Raises ScoresError where there is none: no such file, damaged, or not a matrix of real numbers.
     """
+    if storage.is_stream(path):
+        raise ScoresError(f"{path} is a pipe or a device: scores are read from files, so save it first")
     try:
         table = np.lib.format.open_memmap(path, mode="r")
     except OSError as error:

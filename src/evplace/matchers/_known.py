@@ -2,15 +2,12 @@
 
 Four signs of each answer are averaged over the images before it, and where the later ones are known, over
 these too: how like the reference is, how far it leads over other places, whether the single image agrees with
-the sequence, and how sure the filter is. What they are worth depends on how well the drive is recognised as a
-whole, by night less than by day: so each also enters times the drive's usual likeness, and times its usual
-agreement. Scores come as robust z-scores, which mean the same on any map and by any light; one set of weights
-serves all. They are fitted on drives through other towns than the benchmark's (`evplace reproduce known`).
+the sequence, and how sure the filter is. Scores come as robust z-scores, which mean the same on any map and
+by any light; so one set of weights serves all. They are fitted on drives through other towns than the
+benchmark's (`evplace reproduce known`).
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -21,39 +18,12 @@ from evplace.matchers._known_weights import LATE, LIVE
 Floats = NDArray[np.float64]
 
 SIGNS = 4
-LIKENESS, AGREEMENT = 0, 2
-"""Signs by their place."""
-SPANS = (1e-3, 4.0, 12.0)
+SPANS = np.array([1e-3, 4.0, 12.0])
 """Over how many images, at ten a second and while the camera moves, each sign is averaged."""
-USUAL_LIKENESS, USUAL_AGREEMENT = 5.5, 0.5
-"""Where a drive begins."""
-
-
-class Columns(NamedTuple):
-    """Running means: of which sign, over how many images, from what value that counts as how many images."""
-
-    sign: NDArray[np.int64]
-    span: Floats
-    start: Floats
-    started: Floats
-    where_agreed: NDArray[np.bool_]
-    """Whether only images count that agree with the sequence."""
-
-
-def _columns(spans: tuple[float, ...]) -> Columns:
-    """Each sign over each span; the drive's usual likeness where images agree; its usual agreement."""
-    many = SIGNS * len(spans)
-    return Columns(
-        np.array([*np.repeat(np.arange(SIGNS), len(spans)), LIKENESS, AGREEMENT]),
-        np.array([*spans * SIGNS, 100.0, 60.0]),
-        np.array([*[0.0] * many, USUAL_LIKENESS, USUAL_AGREEMENT]),
-        np.array([*[0.0] * many, 10.0, 10.0]),
-        np.array([*[False] * many, True, False]),
-    )
-
-
-BEFORE, AHEAD = _columns(SPANS), _columns(SPANS[1:])
-"""What is averaged of the images up to an answer, and of those from it on."""
+LONGER = np.array([sign * len(SPANS) + span for sign in range(SIGNS) for span in range(1, len(SPANS))])
+"""Where the means over the longer spans stand."""
+LEAST_AHEAD = 0.5
+"""Images that must be ahead, by their weights, for these to have a mean."""
 
 
 def signs_of(read: Floats) -> Floats:
@@ -70,64 +40,59 @@ def signs_of(read: Floats) -> Floats:
 
 
 class Means:
-    """The means of BEFORE, image by image."""
+    """Running means of the signs, image by image."""
 
     def __init__(self) -> None:
-        self._sums = BEFORE.start * BEFORE.started
-        self._weights = BEFORE.started.copy()
+        self._sums = np.zeros((SIGNS, len(SPANS)))
+        self._weights = np.zeros(len(SPANS))
 
     def add(self, signs: Floats, weight: float) -> Floats:
-        """(columns,) the means with one more image; one that says nothing changes nothing."""
-        _add(self._sums, self._weights, signs, weight, BEFORE)
-        return self._sums / self._weights
+        """(SIGNS * SPANS,) the means with one more image; one that says nothing changes nothing."""
+        keep = np.exp(-weight / SPANS)
+        self._sums = self._sums * keep + signs[:, None] * weight
+        self._weights = self._weights * keep + weight + 1e-9
+        return np.asarray((self._sums / self._weights).reshape(-1), np.float64)
 
 
 @njit(cache=True, nogil=True)
-def _add(sums: Floats, weights: Floats, signs: Floats, weight: float, columns: Columns) -> None:
-    for c in range(len(sums)):
-        own = weight * signs[AGREEMENT] if columns.where_agreed[c] else weight
-        keep = np.exp(-own / columns.span[c])
-        sums[c] = sums[c] * keep + signs[columns.sign[c]] * own
-        weights[c] = weights[c] * keep + own + 1e-9
-
-
-@njit(cache=True, nogil=True)
-def means_of(signs: Floats, weights: Floats, columns: Columns) -> Floats:
-    """(n, columns) the running means of a drive (n, SIGNS), each up to its image."""
-    out = np.empty((len(signs), len(columns.span)))
-    sums, totals = columns.start * columns.started, columns.started.copy()
-    for i in range(len(signs)):
-        _add(sums, totals, signs[i], weights[i], columns)
-        out[i] = sums / totals
+def means_of(signs: Floats, weights: Floats, spans: Floats) -> Floats:
+    """(n, SIGNS * spans) the running means of a drive (n, SIGNS), each up to its image."""
+    n, many = signs.shape
+    out = np.empty((n, many * len(spans)))
+    sums, total = np.zeros((many, len(spans))), np.zeros(len(spans))
+    for i in range(n):
+        for s in range(len(spans)):
+            keep = np.exp(-weights[i] / spans[s])
+            total[s] = total[s] * keep + weights[i] + 1e-9
+            for k in range(many):
+                sums[k, s] = sums[k, s] * keep + signs[i, k] * weights[i]
+                out[i, k * len(spans) + s] = sums[k, s] / total[s]
     return out
 
 
 def means_ahead(signs: Floats, weights: Floats) -> Floats:
-    """(n, columns of AHEAD) the means of a drive (n, SIGNS), each from its image on."""
-    ahead: Floats = means_of(signs[::-1].copy(), weights[::-1].copy(), AHEAD)[::-1]
+    """(n, ...) the means of a drive (n, SIGNS), each from its image on, over the longer spans.
+
+    NaN where nothing that is ahead says anything, as at a long stop.
+    """
+    ahead: Floats = means_of(signs[::-1].copy(), weights[::-1].copy(), SPANS[1:])[::-1]
+    silent = np.cumsum(weights[::-1])[::-1] < LEAST_AHEAD
+    ahead[silent] = np.nan
     return ahead
 
 
-def features(before: Floats, ahead: Floats | None = None) -> Floats:
-    """(..., features) what the weights are of, from the means before an answer and, if known, those ahead."""
-    means, usual = before[..., :-2], before[..., -2:]
-    if ahead is not None:
-        means = np.concatenate([means, ahead[..., :-2]], axis=-1)
-        usual = (usual + ahead[..., -2:]) / 2
-    parts = [means]
-    for at, middle in enumerate((USUAL_LIKENESS, USUAL_AGREEMENT)):
-        off = usual[..., at : at + 1] - middle
-        parts += [off, means * off]
-    return np.concatenate(parts, axis=-1)
+def joined(before: Floats, ahead: Floats) -> Floats:
+    """(..., features) the means before and ahead; where these are not known, those before stand for them."""
+    return np.concatenate([before, np.where(np.isnan(ahead), before[..., LONGER], ahead)], axis=-1)
 
 
 def of_drive(signs: Floats, weights: Floats, late: bool) -> Floats:
-    """(n, features) of all answers (n, SIGNS) of a drive."""
-    before = means_of(signs, weights, BEFORE)
-    return features(before, means_ahead(signs, weights) if late else None)
+    """(n, features) what the weights are of, for all answers (n, SIGNS) of a drive."""
+    before = means_of(signs, weights, SPANS)
+    return joined(before, means_ahead(signs, weights)) if late else before
 
 
-def probability(of: Floats) -> Floats:
+def probability(features: Floats) -> Floats:
     """(...,) that the answers are right, from their features (..., features) live or late."""
-    weights = LIVE if of.shape[-1] == len(LIVE) - 1 else LATE
-    return np.asarray(1 / (1 + np.exp(-(weights[0] + of @ weights[1:]))), np.float64)
+    weights = LIVE if features.shape[-1] == len(LIVE) - 1 else LATE
+    return np.asarray(1 / (1 + np.exp(-(weights[0] + features @ weights[1:]))), np.float64)

@@ -40,7 +40,7 @@ from evplace.matchers import (
 from evplace.matchers._answering import Found, Reader
 from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
 from evplace.matchers._calibration import LATE, LIVE, checked, measured
-from evplace.matchers._known import Means, features, means_ahead, of_drive, probability
+from evplace.matchers._known import Means, joined, means_ahead, of_drive, probability
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
 from evplace.matchers._ways import Ways
@@ -128,7 +128,7 @@ class _Live:
             self._filter.move(drive_s)
         belief = self._filter.see(z, weight)
         found = self._reader.find(belief, z)
-        right = float(probability(features(self._means.add(found.signs, weight))))
+        right = float(probability(self._means.add(found.signs, weight)))
         return [_answer(self, self._check.queries - 1, belief, found, right, self._clock.standing)]
 
     def finish(self) -> list[Answer]:
@@ -192,7 +192,7 @@ class _Lagging:
         for at in range(due):
             one = self._waiting.popleft()
             before = self._means.add(found[at].signs, one.weight)
-            right = float(probability(features(before, ahead[at])))
+            right = float(probability(joined(before, ahead[at])))
             belief = beliefs[one.moment - first]
             answers.append(_answer(self, one.query, belief, found[at], right, one.standing))
         while self._waiting and self._waiting[0].moment > self._moved - len(self._moments):

@@ -20,7 +20,7 @@ from evplace import places as places_of
 from evplace.core import families
 from evplace.core.errors import EvplaceError, InputError, PlaceMapError
 from evplace.core.settings import to_dict
-from evplace.core.storage import new_folder, read_array, write_json
+from evplace.core.storage import new_folder, read_array, write_array, write_json
 from evplace.drives.to_traverse import open_traverse
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import MARK as TRAVERSE
@@ -186,12 +186,12 @@ class PlaceMap:
             for name, value in self.content.items():
                 write_content(folder, name, value)
             for name, array in (self.learned or {}).items():
-                np.save(folder / of_matcher(name), array)
+                write_array(folder / of_matcher(name), array)
             columns = [self.items.place, *self.items.position.T, self.items.heading_deg]
-            np.save(folder / "items.npy", np.stack(columns, axis=1).astype(np.float64))
-            np.save(folder / "drive.npy", self.drive)
+            write_array(folder / "items.npy", np.stack(columns, axis=1).astype(np.float64))
+            write_array(folder / "drive.npy", self.drive)
             if self.items.t_us is not None:
-                np.save(folder / TIMES, self.items.t_us)
+                write_array(folder / TIMES, self.items.t_us)
             description = {
                 "format": FORMAT,
                 **self.settings,

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import InputError, PlaceMapError
-from evplace.core.storage import read_array, read_bytes, read_json, sha256
+from evplace.core.storage import read_array, read_bytes, read_json, sha256, write_array
 
 FORMAT = "evplace-map-2"
 OLD_FORMAT = "evplace-map-1"
@@ -124,7 +123,7 @@ def write_content(folder: Path, name: str, value: NDArray[Any] | bytes) -> None:
     if isinstance(value, bytes):
         file.write_bytes(value)
     else:
-        np.save(file, value)
+        write_array(file, value)
 
 
 def read_content(folder: Path, files: Sequence[str], what: str) -> dict[str, NDArray[Any] | bytes]:

@@ -27,29 +27,34 @@ SURROUNDINGS = 10.0
 class Edges:
     """How images are described; scores go from -1 to 1."""
 
-    width: int = 80
-    """Columns that an image is reduced to; smaller ones stay as they are (ours)."""
-    height: int = 45
-    """Rows that it is reduced to (ours)."""
+    pixels: int = 3600
+    """Pixels that an image is reduced to, its shape kept: 80x45 of 160x90; smaller ones stay as they are
+    (ours)."""
     orientations: int = 6
     """Directions of an edge that are told apart (ours)."""
     cell: int = 4
     """Side in pixels of the cells whose edges are counted together (ours)."""
 
     def __post_init__(self) -> None:
-        if min(self.width, self.height, self.cell) < 1 or self.orientations < 2:
+        if min(self.pixels, self.cell) < 1 or self.orientations < 2:
             raise SettingsError(
-                "the settings of edges need width, height and cell of 1 or more, and 2 orientations or more"
+                "the settings of edges need pixels and cell of 1 or more, and 2 orientations or more"
             )
 
     def describe(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
         """(n, dimensions): contrast and directions, each of length 1/sqrt(2), or 0 without any contrast."""
-        values = np.sqrt(reduced(grey(images), self.height, self.width) / np.float32(255))
+        height, width = self._size(*images.shape[1:3])
+        values = np.sqrt(reduced(grey(images), height, width) / np.float32(255))
         smooth = blurred(values, 0.7)
         contrast, directions = unit(_contrast(smooth), 0.0), unit(self._directions(smooth), 0.0)
         vectors = np.concatenate([contrast, directions], axis=1) * np.float32(np.sqrt(0.5))
         vectors[np.ptp(values, axis=(1, 2)) < FLAT] = 0
         return vectors
+
+    def _size(self, height: int, width: int) -> tuple[int, int]:
+        """Rows and columns after the reduction."""
+        scale = min(1.0, (self.pixels / (height * width)) ** 0.5)
+        return max(round(height * scale), 1), max(round(width * scale), 1)
 
     def _directions(self, values: Values) -> NDArray[np.float32]:
         """(n, orientations, rows, columns) how much of each cell's edges runs which way, around its mean."""

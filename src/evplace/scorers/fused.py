@@ -42,6 +42,8 @@ EDGES_VERSION = "1"
 """Vectors of another version of `Edges` cannot be compared with these."""
 STANDING = 0.5
 """Without positions, images that show less than this share of the usual are left out: the camera stood."""
+FAR_APART_US = 500_000
+"""Images so far apart do not tell whether the camera stood between them."""
 BLOCK = 64
 """Images described at once."""
 
@@ -56,14 +58,14 @@ class Fused:
     """How an image is averaged with those before it."""
     trained: bool = True
     """Whether the trained descriptor takes part; False leaves the edges alone."""
-    components: int = 384
-    """Numbers that are kept of each vector."""
+    components: int = 256
+    """Numbers that are kept of a vector of the edges; half as many of one of the trained descriptor."""
 
     presets: ClassVar[Mapping[str, Fused]]
 
     def __post_init__(self) -> None:
-        if not 0 <= self.every_m < 1e6 or self.components < 1:
-            raise SettingsError("the settings of fused need every_m of 0 or more, components of 1 or more")
+        if not 0 <= self.every_m < 1e6 or self.components < 2:
+            raise SettingsError("the settings of fused need every_m of 0 or more, components of 2 or more")
 
     @property
     def parts(self) -> dict[str, Descriptor]:
@@ -78,7 +80,8 @@ class Fused:
         references = means[np.searchsorted(filled, kept)]
         content: dict[str, NDArray[np.float32] | NDArray[np.uint8] | bytes] = {REFERENCES: references}
         for name, part in self.parts.items():
-            found = compress(_described(part, references), self.components)
+            many = self.components if name == "edges" else self.components // 2
+            found = compress(_described(part, references), many)
             content |= {f"{name}_basis": found.basis, f"{name}_vectors": found.vectors}
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
@@ -117,6 +120,8 @@ def _kept(reference: Traverse, places: Places, every_m: float) -> NDArray[np.int
         spacer = Spacer(SpacingSettings(every_m=every_m), reference.track)
         chosen = np.flatnonzero(used).tolist()
         return np.array([at for at in chosen if spacer.keeps(int(reference.t_us[at]), -1)], np.int64)
+    if np.median(np.diff(reference.t_us, prepend=reference.t_us[0])) >= FAR_APART_US:
+        return np.flatnonzero(used)
     shown = activity(reference.images, of_events=bool((reference.counts >= 0).any()))
     return np.flatnonzero(used & ~(shown < STANDING * np.nanmedian(shown[used])))
 

@@ -5,9 +5,11 @@ The weights are kept as safetensors, and as the ONNX graph that answers.
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,8 @@ from evplace.scorers import Content, Learned, Learning, usable
 
 BATCH = 64
 """Images scored at once: larger batches gain nothing and cost memory."""
+MOST_S = 10.0
+"""Seconds after which a network that scores one image is stopped."""
 GRAPH, WEIGHTS = "network.onnx", "weights.safetensors"
 
 
@@ -29,12 +33,21 @@ class Network:
     last_relu: bool = False
     """ReLU on the last layer (paper, Table 1: yes). Off by default: a place whose logit falls below zero gets
     no gradient from its own images any more."""
+    own_scale: bool = False
+    """Divide each image by its own root mean square, so that more or fewer events all over change nothing
+    (paper: not mentioned)."""
     dropout: float = 0.0
     """Share of activations dropped before each fully connected layer (paper: not mentioned)."""
+    label_smoothing: float = 0.0
+    """Share of each image's label that all places get alike (paper: not mentioned)."""
     optimiser: Literal["adam", "sgd"] = "adam"
     """adam or sgd (paper: not said; 0.001 is Adam's usual rate)."""
     learning_rate: float = 0.001
     """(paper: 0.001)"""
+    schedule: Literal["constant", "cosine"] = "constant"
+    """cosine: the learning rate falls along half a cosine, to nearly nothing at the last step."""
+    weight_decay: float = 0.0
+    """How much all weights shrink in a step, in learning rates (AdamW; paper: not mentioned)."""
     batch: int = 64
     """Images in a step (paper: 64)."""
     steps: int = 1000
@@ -43,8 +56,9 @@ class Network:
     """If above 0, this many passes over all images in place of `steps`."""
     seed: int = 0
     """Draws the first weights and the order of the images."""
-    augment: Literal["none", "light"] = "none"
-    """light: each image of a batch in another light (ours; see `augmentation`). For camera images."""
+    augment: Literal["none", "light", "events"] = "none"
+    """What is done to each image of a batch (ours; see `augmentation`). light: another light, for camera
+    images; events: shifts, lost events, noise and things in the way, for event images."""
     precision: Literal["auto", "float32", "bfloat16"] = "auto"
     """auto takes bfloat16 where the processor has it: with channels-last 2.4 times plain float32."""
 
@@ -54,8 +68,13 @@ class Network:
                 raise SettingsError(
                     f"the setting '{name}' cannot be {getattr(self, name)}: it must be above 0"
                 )
-        if self.epochs < 0 or self.seed < 0:
-            raise SettingsError("the settings 'epochs' and 'seed' cannot be below 0")
+        for name in ("epochs", "seed", "weight_decay"):
+            if not getattr(self, name) >= 0:
+                raise SettingsError(f"the setting '{name}' cannot be {getattr(self, name)}: it is 0 or more")
+        if not 0 <= self.label_smoothing < 1:
+            raise SettingsError(
+                f"the setting 'label_smoothing' cannot be {self.label_smoothing}: it takes 0 to below 1"
+            )
 
     presets: ClassVar[Mapping[str, Network]]
 
@@ -68,7 +87,7 @@ class Network:
         from evplace.scorers._network.training import image_shape, train_network
 
         weights = train_network(reference.images, labels, used, places.n, self, learning)
-        graph = onnx_bytes(weights, image_shape(reference.images), self.last_relu)
+        graph = onnx_bytes(weights, image_shape(reference.images), self.last_relu, self.own_scale)
         return Learned({GRAPH: graph, WEIGHTS: save(weights)})
 
     def open(self, content: Content) -> NetworkRows:
@@ -79,8 +98,11 @@ class Network:
 Network.presets = {
     "paper": Network(last_relu=True),
     "notebook": Network(dropout=0.5, optimiser="sgd", epochs=1000),
+    "tuned": Network(
+        own_scale=True, label_smoothing=0.1, schedule="cosine", weight_decay=0.01, augment="events"
+    ),
 }
-"""paper: as printed. notebook: as the author's published notebook does."""
+"""paper: as printed. notebook: as the author's published notebook does. tuned: ours, for event images."""
 
 
 TrainSettings = Network
@@ -111,6 +133,7 @@ class NetworkRows:
             raise _unfit(error) from error
         if [one.name for one in self._session.get_inputs()] != [INPUT]:
             raise PlaceMapError(f"the map's {GRAPH} does not take '{INPUT}' alone")
+        _try(self._session)
 
     def rows(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
         """See OpenScorer."""
@@ -121,6 +144,29 @@ class NetworkRows:
             return np.concatenate(scores)
         except Exception as error:  # likewise; so is a graph that fits neither these images nor itself
             raise _unfit(error) from error
+
+
+def _try(session: Any) -> None:
+    """Run a network once on a black image, in bounded time; PlaceMapError where it gives no row of scores."""
+    import onnxruntime as ort
+
+    from evplace.scorers._network.network_onnx import INPUT, MOST_PIXELS
+
+    shape = session.get_inputs()[0].shape[1:]
+    sizes = [side for side in shape if type(side) is int and side > 0]
+    if len(shape) != 3 or len(sizes) != 3 or math.prod(sizes) > MOST_PIXELS:
+        raise PlaceMapError(f"the map's {GRAPH} takes images of shape {shape!r}, which none has")
+    how = ort.RunOptions()
+    late = threading.Timer(MOST_S, lambda: setattr(how, "terminate", True))
+    late.start()
+    try:
+        scores = session.run(None, {INPUT: np.zeros((1, *shape), np.uint8)}, how)[0]
+    except Exception as error:  # onnxruntime's errors share no public base
+        raise _unfit(error) from error
+    finally:
+        late.cancel()
+    if scores.ndim != 2 or len(scores) != 1 or scores.dtype != np.float32:
+        raise PlaceMapError(f"the map's {GRAPH} gives {scores.dtype} {scores.shape}, not a row of scores")
 
 
 def file_of(content: Content, name: str) -> bytes:

@@ -52,7 +52,8 @@ class NotebookRows:
 
         from evplace.scorers._network.network import NetworkSettings, network_of
 
-        of_network = NetworkSettings(settings.network.last_relu, settings.dropout)
+        trained = settings.network
+        of_network = NetworkSettings(trained.last_relu, settings.dropout, trained.own_scale)
         self._network = network_of(load(weights), of_network).eval()
         self._network.dropout.train(settings.dropout > 0)
         for norm in (self._network.norm1, self._network.norm2):

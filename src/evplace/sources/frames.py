@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError, TraverseError, UnreadableImageError
+from evplace.core.storage import is_stream
 from evplace.sources._times import UNIT_US, Unit, dated_unit, number, number_us
 
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp")
@@ -145,6 +146,8 @@ def check_rate(fps: float) -> None:
 
 
 def _listed(folder: Path, listing: Path) -> list[Path]:
+    if is_stream(listing):
+        raise TraverseError(f"{listing} is a pipe or a device: lists are read from files, so save it first")
     try:
         rows = list(csv.reader(listing.read_text("utf-8-sig").splitlines()))
     except (OSError, UnicodeDecodeError, csv.Error) as error:

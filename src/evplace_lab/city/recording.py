@@ -13,7 +13,7 @@ import utm
 from numpy.typing import NDArray
 
 from evplace.core.events import Events, Size
-from evplace.core.storage import GrowingArray, new_folder
+from evplace.core.storage import GrowingArray, new_folder, write_array
 from evplace.imaging.images import Imager, frame_image
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import TraverseWriter, new_traverse
@@ -56,7 +56,7 @@ def record_drive(out: Path, town: Town, settings: CitySettings, name: str, path:
         poses = np.array(_drive(film, settings, sensors, colour, drive_number(name, path), tick))
         for writer in (colour, *(sensor.writer for sensor in sensors)):
             writer.track = _track(np.array(colour.t_us), poses)
-        np.save(folder / MARK, poses)
+        write_array(folder / MARK, poses)
 
 
 def _drive(

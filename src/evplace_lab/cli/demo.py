@@ -139,7 +139,7 @@ def _rows(args: Args, drives: dict[str, Path], name: str, method: str) -> Iterat
     with progress(f"{method} on {name}") as show:
         for number, query in enumerate(QUERIES):
             traverse = Traverse.load(drives[query] / INPUTS[name])
-            result = evaluate(Localizer(place_map), traverse, reference=reference)
+            result = evaluate(Localizer(place_map), traverse, rule="view", reference=reference)
             result.save(args.out / "results" / f"{query} {name} {method}", overwrite=True)
             show(number + 1, len(QUERIES), query)
             yield _row(query, name, method, result)
@@ -211,20 +211,29 @@ def _print(rows: list[dict[str, object]]) -> None:
         table.append([query, *map(_percent, shown), _percent(cells[0]["chance_seen"])])
     heads = [f"{method}, {name}" for method, name in kinds]
     columns = ("query", *heads, *(f"{head}, seen" for head in heads), "chance, seen")
-    print_table("Accuracy in % of live answers: the map is day-1, the query as named", columns, table)
+    print_table(
+        "Accuracy in % of live answers; seen: the map has that view; the map is day-1, the query as named",
+        columns,
+        table,
+    )
 
 
 def _sentence(rows: list[dict[str, object]]) -> str:
     """What was seen, in words."""
     share = {(row["query"], row["input"], row["matcher"]): row["accuracy_seen"] for row in rows}
     night = {kind: _percent(share["night-1", *kind]) for kind in itertools.product(INPUTS, METHODS)}
-    kept = [row["unseen_rejected"] for row in rows if row["matcher"] == "best" and row["input"] == "events"]
-    known = [float(str(one)) for one in kept if one is not None]
-    return (
+    best = [row for row in rows if row["matcher"] == "best" and row["input"] == "events"]
+    called = [float(str(row["unseen_rejected"])) for row in best if row["unseen_rejected"] is not None]
+    found = (
         f"At night, events find {night['events', 'best']} % of the street's images and colour "
         f"{night['colour', 'best']} %; the paper's method finds {night['events', 'paper']} and "
-        f"{night['colour', 'paper']} %. On the other path, {_percent(np.mean(known))} % of the images of "
-        "streets that the map has never seen were called just that."
+        f"{night['colour', 'paper']} %."
+    )
+    if not called:
+        return found
+    return (
+        f"{found} On the other path, {_percent(sum(called) / len(called))} % of the images of streets that "
+        "the map has never seen were called just that."
     )
 
 

@@ -6,7 +6,7 @@ Examples:
   evplace reproduce figure5 --city city -o out          what table2 has trained is not trained again
   evplace reproduce ablations --city city -o out
   evplace reproduce real --data data -o out             real sets that lie in a folder
-  evplace reproduce descriptor -o out                   the learned descriptor: two hours of a core
+  evplace reproduce descriptor -o out                   the learned descriptor: 75 minutes of a core
   evplace reproduce table2 --city city -o out --methods own.toml    with methods of your own as further rows
   evplace reproduce table2 --city small -o quick --seeds 1 --set steps=50
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from evplace.core.drawing import is_drawn_here
 from evplace.core.errors import MissingExtraError, OutputError
-from evplace.core.storage import new_file
+from evplace.core.storage import check_new_file, new_file
 from evplace_lab.report._found import look
 from evplace_lab.report._page import page
 from evplace_lab.report._plots import plots
@@ -41,7 +42,9 @@ def report(folder: str | Path, out: str | Path | None = None, overwrite: bool = 
         planned = plots(found, target)
     except MissingExtraError as error:
         planned, remark = {}, f"No plots beside this page: {error}"
-    there = next((plot for plot in planned if plot.exists()), None)
+    check_new_file(target, overwrite)
+    # Plots of ours without their page are those of a report that was stopped.
+    there = next((plot for plot in planned if plot.exists() and not is_drawn_here(plot)), None)
     if there is not None and not overwrite:
         raise OutputError(f"{there} exists: name another page, remove it, or add `overwrite=True`")
     with new_file(target, overwrite) as partial:

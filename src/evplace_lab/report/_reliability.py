@@ -43,15 +43,14 @@ def _figure(name: str, result: Result) -> Html:
 def _axes() -> Html:
     """A square from 0 to 100 %, its diagonal, and what the axes are."""
     low, high = MARGIN, MARGIN + SIDE
-    square = tag("rect", x=low, y=low, width=SIDE, height=SIDE, fill="none", stroke="var(--line)")
-    line = tag("line", x1=low, y1=high, x2=high, y2=low, stroke="var(--soft)", stroke_dasharray="4 4")
+    square = tag("rect", x=low, y=low, width=SIDE, height=SIDE, class_="frame")
+    line = tag("line", x1=low, y1=high, x2=high, y2=low, class_="as-said")
     words = [
-        tag("text", "0", x=low, y=high + 16, text_anchor="middle", fill="var(--soft)", font_size="12"),
-        tag("text", "said, %", x=low + SIDE // 2, y=high + 28, text_anchor="middle", fill="var(--soft)",
-            font_size="12"),
-        tag("text", "100", x=high, y=high + 16, text_anchor="middle", fill="var(--soft)", font_size="12"),
-        tag("text", "100", x=low - 5, y=low + 5, text_anchor="end", fill="var(--soft)", font_size="12"),
-        tag("text", "right, %", x=low + 6, y=low + 16, fill="var(--soft)", font_size="12"),
+        tag("text", "0", x=low, y=high + 16, text_anchor="middle"),
+        tag("text", "said, %", x=low + SIDE // 2, y=high + 28, text_anchor="middle"),
+        tag("text", "100", x=high, y=high + 16, text_anchor="middle"),
+        tag("text", "100", x=low - 5, y=low + 5, text_anchor="end"),
+        tag("text", "right, %", x=low + 6, y=low + 16),
     ]  # fmt: skip
     return tag("g", square, line, *words)
 
@@ -59,6 +58,4 @@ def _axes() -> Html:
 def _dot(said: float, right: float, share: float) -> Html:
     x, y = MARGIN + SIDE * said, MARGIN + SIDE * (1 - right)
     radius = 3 + 9 * float(np.sqrt(share))
-    return tag(
-        "circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=f"{radius:.1f}", fill="var(--accent)", opacity="0.75"
-    )
+    return tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=f"{radius:.1f}")

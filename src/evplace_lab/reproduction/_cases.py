@@ -28,7 +28,7 @@ class Input:
     exposure: str = "fixed"
     """Of the camera: fixed, or auto."""
     train: Values = field(default_factory=dict)
-    """Settings of the training over those of the paper."""
+    """Settings of the training over those of the method."""
     windows: Values | None = None
     """Settings of windows, where the images are made anew from the drives' events."""
     images: Values | None = None
@@ -50,9 +50,13 @@ class Method:
     settings: Values = field(default_factory=dict)
     """Settings of the matcher over those of the preset."""
     scorer_settings: Values = field(default_factory=dict)
-    """Settings of the scorer."""
+    """Settings of the scorer over those of its preset."""
     every: int = 1
     """Use each, every second ... image of map and query."""
+    scorer_preset: str | None = None
+    """A preset of the scorer; where none is named and the scorer has one, the paper's."""
+    for_camera: bool = True
+    """Whether it is for camera images, too."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +95,7 @@ class Case:
         Raises SettingsError for an unknown name or setting.
         """
         matcher = families.make("matchers", method.matcher, method.preset, method.settings)
-        scorer = families.make("scorers", method.scorer, None, method.scorer_settings)
+        scorer = _scorer_of(method)
         kept, trained = _settings_of(scorer, {**seen.train, **(train or {}), "seed": 0})
         return cls(
             database=database,
@@ -157,15 +161,27 @@ _NETWORK = "network"
 """The field of a scorer that says how its network is trained."""
 
 
+def _scorer_of(method: Method) -> Scorer | Descriptor:
+    """The scorer with its settings."""
+    presets = families.settings_of("scorers", method.scorer)[1]
+    preset = method.scorer_preset or ("paper" if "paper" in presets else None)
+    part: Scorer | Descriptor = families.make("scorers", method.scorer, preset, method.scorer_settings)
+    return part
+
+
 def _settings_of(scorer: Any, changed: Values) -> tuple[Values, Values | None]:
-    """A scorer's own settings, and those of its training where it has a seed: the paper's, but `changed`."""
+    """A scorer's own settings, and with `changed` those of its training, where it has a seed.
+
+    A network within a scorer is trained as the paper says.
+    """
     trained = getattr(scorer, _NETWORK, scorer)
     if not hasattr(trained, "seed"):
         return settings.to_dict(scorer), None
-    paper = getattr(trained, "presets", {}).get("paper", trained)
-    own = {} if trained is scorer else settings.to_dict(scorer)
-    own.pop(_NETWORK, None)
-    return own, settings.to_dict(settings.make(type(trained), changed, paper))
+    if trained is scorer:
+        return {}, settings.to_dict(settings.make(type(trained), changed, trained))
+    own = settings.to_dict(scorer)
+    own.pop(_NETWORK)
+    return own, settings.to_dict(settings.make(type(trained), changed, trained.presets["paper"]))
 
 
 def checksum(values: Values) -> str:

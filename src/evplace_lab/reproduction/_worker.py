@@ -21,8 +21,10 @@ from evplace.evaluation.sweeps import sweep
 from evplace.evaluation.truth import Truth
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Answered, Answers, Localizer
+from evplace.matchers import RouteMatcher
+from evplace.matchers.best import Best
 from evplace.matchers.local import Local
-from evplace.placemap import PlaceMap, train
+from evplace.placemap import PlaceMap, calibrate, train
 from evplace.scorers import Learning, Rows
 from evplace_lab.reproduction import Drives
 from evplace_lab.reproduction._cases import Case
@@ -44,7 +46,7 @@ def work(job: dict[str, Any], say: Callable[[str], None]) -> None:
 def _answer_group(cases: list[Case], drives: Drives, runs: Runs, say: Callable[[str], None]) -> None:
     """Learn the map of `cases`, and answer them one query and scorer after the other."""
     day = drives.opened(cases[0].database, cases[0])
-    learned = _learned(cases[0], day, drives, runs)
+    learned = _calibrated(_learned(cases[0], day, drives, runs), cases)
     for _, group in itertools.groupby(cases, lambda case: (case.query, case.scorer, case.scorer_settings)):
         same = list(group)
         place_map = dataclasses.replace(learned, scorer=same[0].scorer_part)
@@ -68,16 +70,23 @@ def _learned(case: Case, day: Traverse, drives: Drives, runs: Runs) -> PlaceMap:
     """The map of a case: read where it is there, else learned, and kept where that took long."""
     places = drives.places(day, case)
     if case.train is None:
-        return train(day, places, case.scorer_part)
+        return train(day, places, case.scorer_part, matcher=Best())
     file = runs.map_file(case)
     if not file.exists():
         _use_one_thread()
         began = time.process_time()
         learning = Learning(checkpoint=file.with_suffix(".checkpoint"))
-        place_map = train(day, places, case.scorer_part, learning=learning)
+        place_map = train(day, places, case.scorer_part, learning=learning, matcher=Best())
         place_map.info["train_cpu_s"] = round(time.process_time() - began, 1)
         place_map.save(file)
     return PlaceMap.load(file)
+
+
+def _calibrated(place_map: PlaceMap, cases: list[Case]) -> PlaceMap:
+    """The map with what the matcher learns of it that one of the cases wants, where it is one that learns."""
+    learning = (case.matcher_part for case in cases if isinstance(case.matcher_part, RouteMatcher))
+    matcher = next(learning, None)
+    return place_map if matcher is None else calibrate(place_map, matcher)
 
 
 def _answer(

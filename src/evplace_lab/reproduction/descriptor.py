@@ -1,8 +1,8 @@
 """The learned descriptor: its towns, its trainings, and the shipped weights beside them.
 
-The first seed makes the weights that come with evplace: on one core 30 minutes of towns and 25 of training,
-and 25 more for each further seed. They agree to rounding, not to the bit, between processors. How often the
-images of unseen towns and halls are found again says what they are worth.
+The first seed makes the weights that come with evplace: on one core 11 minutes of towns and 20 of training,
+and 20 more for each further seed. Another processor rounds otherwise, and ends in other weights. How often
+the images of unseen towns and halls are found again says what they are worth.
 """
 
 from __future__ import annotations

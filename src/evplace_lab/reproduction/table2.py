@@ -23,7 +23,8 @@ METHODS = tuple(methods())
 FORMAT = "evplace-table-1"
 KEPT_INPUTS = ("events", "events, from 8 bit", "colour")
 KEPT_METHODS = (
-    "global-max", "Algorithm 1", "SeqSLAM, all accepted", "graph, alpha 0.1", "blurred correlation, sequence"
+    "best", "global-max", "network, tuned", "Algorithm 1", "SeqSLAM, all accepted", "graph, alpha 0.1",
+    "blurred correlation, sequence",
 )  # fmt: skip
 """Of these the whole result is kept, with the first seed."""
 MAIN_INPUTS = ("events", "events, from 8 bit", "events, weak sensor", "colour")
@@ -87,6 +88,8 @@ def _cells(choice: Choice) -> Iterator[tuple[Recipe, str, str, list[Case]]]:
                 first = Case.of(recipe.database, recipe.query, inputs()[name], how, choice.train)
                 if inputs()[name].train and first.train is None:
                     continue  # another training is no other input to what is not trained
+                if inputs()[name].sensor == "camera" and not how.for_camera:
+                    continue
                 group = first.with_seeds(choice.seeds)
                 if name in KEPT_INPUTS and method in (*KEPT_METHODS, *choice.methods):
                     group[0] = replace(group[0], keep=f"{recipe.query}, {name}, {method}")

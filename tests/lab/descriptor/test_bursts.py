@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from evplace_lab.descriptor import bursts
 from evplace_lab.descriptor.bursts import HALL_METRE, Bursts, BurstSettings, is_hall, make_bursts
 
 TINY = BurstSettings(routes=2, drives=2, places=4)
@@ -46,6 +47,13 @@ def test_two_drives_pass_the_same_places(town: Bursts, hall: Bursts) -> None:
     for made, step in ((town, TINY.step_m), (hall, HALL_METRE * 60 / TINY.places)):
         apart = np.hypot(*np.moveaxis(made.poses[:, 0, :, :2] - made.poses[:, 1, :, :2], -1, 0))
         assert apart.max() < step + 1.5
+
+
+def test_a_metre_in_a_hall_counts_for_many(hall: Bursts, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bursts, "HALL_METRE", 1.0)
+    plain = make_bursts(HALL, TINY)
+    np.testing.assert_allclose(hall.poses[..., :2], HALL_METRE * plain.poses[..., :2], rtol=1e-5)
+    np.testing.assert_array_equal(hall.poses[..., 2], plain.poses[..., 2])
 
 
 def test_each_fourth_seed_is_halls() -> None:

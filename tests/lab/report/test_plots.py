@@ -41,6 +41,16 @@ def test_no_plot_is_replaced_unasked(tmp_path: Path) -> None:
     assert not (run / "report.html").exists()
 
 
+def test_plots_of_a_report_that_was_stopped_are_drawn_again(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib", reason="plots need the extra 'report'")
+    run = write_run(tmp_path / "run")
+    report(run)
+    (run / "report.html").unlink()  # it is written last
+    (run / "report-items.png").unlink()
+    assert len(report(run).plots) == 5
+    assert (run / "report-items.png").exists()
+
+
 def test_panels_that_are_named_alike_keep_their_own_plots(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib", reason="plots need the extra 'report'")
     panels = [{"panel": name, "points": [[0.5, 0.5, 0.5]]} for name in ("day/night", "day night")]

@@ -13,7 +13,9 @@ import pytest
 
 from evplace.cli import main
 from evplace.core.errors import InputError, OutputError, SettingsError
+from evplace.core.settings import to_dict
 from evplace.imaging.traverse import Traverse
+from evplace.scorers.network import Network
 from evplace_lab.city import CitySettings, generate
 from evplace_lab.reproduction import Choice, ablations, figure5, real, reproduce, table2
 from evplace_lab.reproduction._cases import Case
@@ -47,9 +49,12 @@ def table(city: Path, out: Path) -> dict[str, Any]:
 
 def test_table_2_has_every_cell_by_both_rules(table: dict[str, Any], out: Path) -> None:
     rows = table["rows"]
-    trained_methods = sum(method.scorer == "network" for method in methods().values())
+    all_ways = methods().values()
+    of_colour = sum(method.for_camera for method in all_ways)
+    trained_of_colour = sum(method.for_camera and method.scorer == "network" for method in all_ways)
     live = [row for row in rows if row["answers"] == "live"]
-    assert len(live) == 5 * (2 * len(methods()) + trained_methods) * 2  # augmenting is for training
+    assert len(live) == 5 * (len(all_ways) + of_colour + trained_of_colour) * 2  # augmenting is for training
+    assert {row["input"] for row in rows if row["matcher"] == "network, tuned"} == {"events"}
     late = {row["matcher"] for row in rows if row["answers"] == "hindsight"}
     assert late
     assert not late & {"global-max", "Algorithm 1", "raw correlation", "blurred correlation"}
@@ -152,6 +157,26 @@ def test_methods_of_ones_own_stand_beside_the_others(
         file.write_text(text)
         with pytest.raises(SettingsError, match=words):
             read_methods(file)
+
+
+def test_a_network_is_trained_as_the_paper_says_or_by_the_methods_preset_and_settings() -> None:
+    def training(name: str, train: dict[str, Any], **changed: Any) -> dict[str, Any]:
+        case = Case.of("day-1", "night-1", inputs()[name], replace(methods()["global-max"], **changed), train)
+        assert case.train is not None
+        assert replace(case, train=None).scorer_settings == {}
+        return case.train
+
+    printed, tuned = (to_dict(Network.presets[name]) for name in ("paper", "tuned"))
+    assert training("events", {}) == printed
+    assert training("events", {}, scorer_preset="tuned") == tuned
+    assert training("events", {}, scorer_settings={"steps": 3, "batch": 5}) == printed | {
+        "steps": 3,
+        "batch": 5,
+    }
+    assert training("events", {"steps": 4}, scorer_settings={"steps": 3}) == printed | {"steps": 4}
+    assert training("colour, augmented", {}) == printed | {"augment": "light"}
+    with pytest.raises(SettingsError, match="no preset 'best'"):
+        training("events", {}, scorer_preset="best")
 
 
 def test_figure_5_has_a_curve_for_each_method(table: dict[str, Any], city: Path, out: Path) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from safetensors.numpy import load
 
 from evplace.core.errors import PlaceMapError, SettingsError, TraverseError
 from evplace.imaging.traverse import Traverse
@@ -15,12 +18,12 @@ from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
 from evplace.scorers import Learning
 from evplace.scorers._network import checkpoint
-from evplace.scorers._network.training import batches, train_network
+from evplace.scorers._network.training import batches, set_rate, train_network
 
 torch = pytest.importorskip("torch", reason="the network needs the extra 'train'")
 
-from evplace.scorers._network.network import Network, NetworkSettings, to_input, weights_of  # noqa: E402 - only with torch
-from evplace.scorers._network.network_onnx import OPERATORS, check_graph, onnx_bytes  # noqa: E402
+from evplace.scorers._network.network import Network, NetworkSettings, scaled, to_input, weights_of  # noqa: E402 - only with torch
+from evplace.scorers._network.network_onnx import OPERATORS, SCALE, check_graph, onnx_bytes  # noqa: E402
 from evplace.scorers.network import GRAPH, NetworkRows, TrainSettings  # noqa: E402
 
 Images = NDArray[np.uint8]
@@ -56,19 +59,33 @@ def test_layers_in_the_order_of_the_table() -> None:
     assert (network(x) >= 0).all()
 
 
-@pytest.mark.parametrize(
-    ("shape", "last_relu"), [((90, 160), True), ((90, 160), False), ((90, 160, 3), False)]
-)
-def test_the_onnx_graph_says_what_torch_says(shape: tuple[int, ...], last_relu: bool) -> None:
+@pytest.mark.parametrize("shape", [(90, 160), (90, 160, 3)])
+@pytest.mark.parametrize("last_relu", [False, True])
+@pytest.mark.parametrize("own_scale", [False, True])
+def test_the_onnx_graph_says_what_torch_says(
+    shape: tuple[int, ...], last_relu: bool, own_scale: bool
+) -> None:
     torch.manual_seed(1)
     image = (3 if len(shape) == 3 else 1, 90, 160)
-    network = Network(7, image, NetworkSettings(last_relu=last_relu))
+    network = Network(7, image, NetworkSettings(last_relu=last_relu, own_scale=own_scale))
     images = some_images(5, shape)
+    images[0] = 0
+    images[1] //= 50
     network(to_input(images))  # gives the batch norms statistics of their own
     network.eval()
-    scores = NetworkRows(onnx_bytes(weights_of(network), image, last_relu)).rows(images)
+    scores = NetworkRows(onnx_bytes(weights_of(network), image, last_relu, own_scale)).rows(images)
     wanted = torch.softmax(network(to_input(images)), 1).detach().numpy()
     np.testing.assert_allclose(scores, wanted, atol=1e-6)
+
+
+def test_with_a_scale_of_its_own_more_events_all_over_change_little() -> None:
+    images = to_input(some_images(4) // 3)
+    ours = scaled(images)
+    torch.testing.assert_close(scaled(3 * images), ours, rtol=0.1, atol=0)
+    torch.testing.assert_close(
+        ours.square().mean(dim=(2, 3)).sqrt(), torch.full((4, 1), SCALE), rtol=0.2, atol=0
+    )
+    assert not scaled(torch.zeros(1, 1, 8, 8)).any()
 
 
 def test_training_learns_the_drive(network_map: PlaceMap, day: Traverse, places: PlaceGrid) -> None:
@@ -84,11 +101,19 @@ def test_a_seed_gives_the_same_weights(day: Traverse, places: PlaceGrid) -> None
     assert first.content != other.content
 
 
+@pytest.mark.parametrize(
+    "settings", [TrainSettings(dropout=0.2), TrainSettings.presets["tuned"], TrainSettings(augment="light")]
+)
 def test_a_killed_run_goes_on_to_the_same_weights(
-    day: Traverse, places: PlaceGrid, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    settings: TrainSettings,
+    day: Traverse,
+    places: PlaceGrid,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(checkpoint, "EVERY", 2)
-    whole = train(day, places, "network", steps=7, batch=8, dropout=0.2)
+    short = replace(settings, steps=7, batch=8)
+    whole = train(day, places, short)
     file = tmp_path / "run.checkpoint"
 
     def kill(step: int, steps: int, loss: float) -> None:
@@ -96,10 +121,10 @@ def test_a_killed_run_goes_on_to_the_same_weights(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        train(day, places, "network", steps=7, batch=8, dropout=0.2, learning=Learning(kill, file))
+        train(day, places, short, learning=Learning(kill, file))
     steps_left: list[int] = []
     learning = Learning(lambda step, steps, loss: steps_left.append(step), file)
-    resumed = train(day, places, "network", steps=7, batch=8, dropout=0.2, learning=learning)
+    resumed = train(day, places, short, learning=learning)
     assert steps_left == [5, 6, 7]
     assert resumed.content == whole.content
     assert not file.exists()
@@ -127,14 +152,59 @@ def test_sgd_and_epochs(day: Traverse, places: PlaceGrid) -> None:
     assert seen == [2 * -(-len(day) // 32)] * seen[0]
 
 
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"weight_decay": 0.5}, {"label_smoothing": 0.2}, {"augment": "events"}, {"augment": "light"},
+        {"own_scale": True},
+    ],
+)  # fmt: skip
+def test_each_setting_changes_the_weights(
+    changed: dict[str, object], day: Traverse, places: PlaceGrid
+) -> None:
+    plain, other = (train(day, places, "network", steps=2, batch=8, **values) for values in ({}, changed))
+    assert plain.content != other.content
+
+
+@pytest.mark.parametrize("optimiser", ["adam", "sgd"])
+def test_weights_decay_by_the_setting_alone(
+    optimiser: Literal["adam", "sgd"], day: Traverse, places: PlaceGrid
+) -> None:
+    """A rate so small that nothing is learned, and a decay so large that it shows."""
+    first, last = (
+        load(
+            train(
+                day,
+                places,
+                "network",
+                optimiser=optimiser,
+                learning_rate=1e-9,
+                weight_decay=decay,
+                steps=1,
+                batch=8,
+            ).content["weights.safetensors"]
+        )
+        for decay in (0.0, 5e8)
+    )
+    np.testing.assert_allclose(last["full2.weight"], first["full2.weight"] / 2, atol=1e-6)
+
+
+def test_the_rate_falls_along_half_a_cosine() -> None:
+    optimiser = torch.optim.SGD([torch.zeros(1)], lr=1.0)
+    for done, constant, cosine in ((0.0, 0.1, 0.1), (0.5, 0.1, 0.05), (0.75, 0.1, 0.0146447), (1, 0.1, 0.0)):
+        for schedule, rate in (("constant", constant), ("cosine", cosine)):
+            set_rate(optimiser, TrainSettings(learning_rate=0.1, schedule=schedule), done)  # type: ignore[arg-type]
+            assert optimiser.param_groups[0]["lr"] == pytest.approx(rate, abs=1e-6)
+
+
 def test_presets_say_what_the_paper_and_its_notebook_say() -> None:
     paper = TrainSettings.presets["paper"]
     assert (paper.last_relu, paper.learning_rate, paper.batch, paper.steps) == (True, 0.001, 64, 1000)
     notebook = TrainSettings.presets["notebook"]
-    assert (notebook.dropout, notebook.epochs) == (
-        0.5,
-        1000,
-    )
+    assert (notebook.dropout, notebook.epochs) == (0.5, 1000)
+    for printed in (paper, notebook):
+        assert (printed.augment, printed.schedule) == ("none", "constant")
+        assert (printed.weight_decay, printed.label_smoothing) == (0, 0)
 
 
 def test_one_image_at_a_time_says_what_a_batch_says(network_map: PlaceMap, day: Traverse) -> None:
@@ -143,7 +213,13 @@ def test_one_image_at_a_time_says_what_a_batch_says(network_map: PlaceMap, day: 
     np.testing.assert_allclose(single, scorer.rows(day.images), atol=1e-6)
 
 
-@pytest.mark.parametrize("wrong", [{"batch": 0}, {"steps": -1}, {"seed": -1}, {"learning_rate": 0.0}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"batch": 0}, {"steps": -1}, {"seed": -1}, {"learning_rate": 0.0}, {"epochs": -1},
+        {"weight_decay": -0.1}, {"label_smoothing": 1.0}, {"label_smoothing": -0.1},
+    ],
+)  # fmt: skip
 def test_settings_that_cannot_be_are_refused(wrong: dict[str, object]) -> None:
     with pytest.raises(SettingsError):
         TrainSettings(**wrong)  # type: ignore[arg-type]
@@ -174,6 +250,10 @@ def test_one_place_only_is_learned(day: Traverse) -> None:
     assert Localizer(learned).rows(day.images[:2]).tolist() == [[1.0], [1.0]]
 
 
+def image_of(model: Any) -> Any:
+    return model.graph.input[0].type.tensor_type.shape
+
+
 def test_a_graph_of_other_operators_is_refused(network_map: PlaceMap) -> None:
     """A loop could run for ever, and weights in other files would be read from anywhere."""
     onnx = pytest.importorskip("onnx")
@@ -181,7 +261,7 @@ def test_a_graph_of_other_operators_is_refused(network_map: PlaceMap) -> None:
     assert isinstance(network, bytes)
     check_graph(network)
     model = onnx.load_from_string(network)
-    assert {node.op_type for node in model.graph.node} == OPERATORS
+    assert {node.op_type for node in model.graph.node} == OPERATORS - {"Add", "GlobalLpPool"}
     for change, words in (
         (lambda one: setattr(one.graph.node[3], "op_type", "Loop"), "it holds 'Loop'"),
         (lambda one: setattr(one.graph.node[3], "domain", "someone"), "it holds 'someone'"),
@@ -191,6 +271,13 @@ def test_a_graph_of_other_operators_is_refused(network_map: PlaceMap) -> None:
             "weights lie in other files",
         ),
         (lambda one: setattr(one.graph.initializer[0], "data_location", 1), "weights lie in other files"),
+        (lambda one: one.graph.node[2].attribute[0].ints.__setitem__(0, 50_000), "layers too large"),
+        (lambda one: one.graph.node.extend([one.graph.node[3]] * 99), "too many"),
+        (
+            lambda one: setattr(one.graph.input[0].type.tensor_type.shape.dim[2], "dim_value", 10**8),
+            "cannot be run|takes images",
+        ),
+        (lambda one: one.graph.input[0].type.tensor_type.shape.dim.pop(), "cannot be run|takes images"),
     ):
         changed = onnx.load_from_string(network)
         change(changed)

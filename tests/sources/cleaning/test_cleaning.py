@@ -184,7 +184,7 @@ def test_a_lamp_is_measured_where_it_is_and_at_its_own_frequency() -> None:
 
 def test_a_passing_edge_is_no_flicker() -> None:
     times = np.sort(np.random.default_rng(5).integers(0, 4000, 500)) + 100_000
-    burst = Events.of(times, np.zeros(500), np.zeros(500), np.ones(500), SIZE)
+    burst = Events.of(times, [0] * 500, [0] * 500, [1] * 500, SIZE)
     end = Events.of([300_000], [31], [23], [True], SIZE)
     meter = FlickerMeter(SIZE, region=8)
     meter.push(merged(Events.of([0], [31], [23], [True], SIZE), burst, end))

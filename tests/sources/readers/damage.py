@@ -26,8 +26,8 @@ def damaged(data: bytes, kind: str, seed: int, number: int, count: int) -> bytes
 
 
 def main(reader: str, file: str, kind: str, seed: int, first: int, count: int) -> None:
-    _decoder.limit_memory()
     module, path = importlib.import_module(f"evplace.sources.readers.{reader}"), Path(file)
+    _decoder.limit_memory()
     data, bad, size = path.read_bytes(), path.with_name(f"damaged{path.suffix}"), (240, 180)
     for number in range(first, count):
         print(number, flush=True)

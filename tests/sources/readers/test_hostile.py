@@ -5,15 +5,17 @@ from __future__ import annotations
 import resource
 import sqlite3
 import struct
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from made import aedat3, mcap_topics, packet_messages, ros1_topics, ros2_bag, some_events
+from made import MAKERS, aedat3, mcap_topics, packet_messages, ros1_topics, ros2_bag, some_events
 
 from evplace.cli import main
-from evplace.core.errors import DamagedRecordingError, RecordingError
+from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.core.events import Events
 from evplace.sources.readers import open_recording, ros2_db3
 from evplace.sources.readers._unpack import LIMIT, UnpackError, unpack
@@ -96,6 +98,164 @@ def test_dates_and_texts_are_no_numbers(name: str, kind: str, tmp_path: Path) ->
     }[kind]()
     with pytest.raises(RecordingError, match="must be numbers, not"):
         list(open_recording(parquet(tmp_path, **{name: values}), (240, 180)).packets())
+
+
+def test_a_group_of_rows_is_not_read_whole(tmp_path: Path) -> None:
+    """Ten million events in one group: the decoder may take 512 MiB, and takes less."""
+    pyarrow, files = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    n, rng = 10_000_000, np.random.default_rng(0)
+    columns = {name: rng.integers(0, 100, n).astype("u2") for name in "xy"} | {"p": np.arange(n) % 2}
+    columns["t_us"] = np.cumsum(rng.integers(0, 3, n))
+    table = pyarrow.table(columns)
+    how = {"row_group_size": n, "use_dictionary": False, "compression": None}
+    files.write_table(table, tmp_path / "a.parquet", **how)
+    code = (
+        "import resource, sys; from pathlib import Path; from evplace.sources.readers import _parquet\n"
+        "from evplace.sources.readers._source import Hints\n"
+        "first = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "source = _parquet.open_here(Path(sys.argv[1]), Hints((100, 100)))\n"
+        "events = sum(len(block.t_us) for block in source.blocks())\n"
+        "print(events, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - first) >> 10)"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code, tmp_path / "a.parquet"], capture_output=True, check=True
+    )
+    events, megabytes = map(int, answer.stdout.split())
+    assert events == n
+    assert megabytes < 60
+
+
+@pytest.mark.parametrize("digits", [10, 5000])
+@pytest.mark.parametrize(
+    ("name", "head"),
+    [
+        ("a.dat", "% Version 2\n% Width {}\n% Height 480\n\x0c\x08"),
+        ("a.raw", "% evt 2.0\n% geometry {}x480\n"),
+        ("a.raw", "% evt 3.0\n% geometry 640x{}\n"),
+        ("a.raw", "% format EVT3;height={};width=640\n% end\n"),
+        ("a.raw", "% evt 2.1\n% format EVT21;height={};width=640\n% end\n"),
+        ("a.aedat", "#!AER-DAT3.1\r\n#Format: RAW\r\n#Source {}: DAVIS240C\r\n#!END-HEADER\r\n"),
+    ],
+)
+def test_numbers_of_any_length_in_headers(name: str, head: str, digits: int, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(head.format("9" * digits).encode("latin-1") + bytes(range(256)) * 9)
+    with pytest.raises(RecordingError) as caught:
+        list(open_recording(tmp_path / name).packets())
+    assert len(str(caught.value)) < 300
+
+
+@pytest.mark.parametrize("encoding", ["klingon", "utf-16", "shift_jis", "idna", "undefined"])
+def test_encodings_of_a_header_in_xml(encoding: str, tmp_path: Path) -> None:
+    """AEDAT 4 describes its streams in XML, which may name any encoding."""
+    path = MAKERS["aedat4"](tmp_path, SOME)
+    data = path.read_bytes()
+    old, new = b'<dv version="2.0">', f'<?xml version="1.0" encoding="{encoding}"?>'.encode()
+    assert old in data
+    text_at = data.index(old)
+    filled = data[text_at : data.index(b"</dv>")].replace(b"  ", b"", len(new))
+    path.write_bytes(data.replace(old, (new + old)[: len(filled)], 1))
+    with pytest.raises(RecordingError):
+        list(open_recording(path).packets())
+
+
+def test_columns_of_one_name_are_asked_about(tmp_path: Path) -> None:
+    pyarrow, files = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    columns = [SOME.t_us, SOME.x, SOME.x + 1, SOME.y, SOME.p.astype(int)]
+    rows = "\n".join(",".join(map(str, row)) for row in zip(*columns, strict=True))
+    (tmp_path / "a.csv").write_text(f"t,x,x,y,p\n{rows}\n")
+    files.write_table(pyarrow.table(list(map(pyarrow.array, columns)), list("txxyp")), tmp_path / "a.parquet")
+    for name in ("a.csv", "a.parquet"):
+        with pytest.raises(RecordingError, match="several columns are called 'x'"):
+            open_recording(tmp_path / name, time_unit="us")
+    found = list(open_recording(tmp_path / "a.csv", time_unit="us", columns="t,-,x,y,p").packets())
+    assert np.array_equal(Events.concatenate(found).x, SOME.x + 1)
+
+
+def test_a_line_without_end_is_no_table(tmp_path: Path) -> None:
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    (tmp_path / "a.txt").write_bytes(b"1 " * 20_000_000)
+    with pytest.raises(RecordingError, match="of no known recording format"):
+        open_recording(tmp_path / "a.txt")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200 << 10
+
+
+WIDE = np.dtype([("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?"), ("more", "V4000")])
+
+
+def test_wide_rows_are_read_in_slices_of_bytes(tmp_path: Path) -> None:
+    rows = np.zeros(20_000, WIDE)
+    rows["t"], rows["x"], rows["y"] = 100 * np.arange(len(rows)), 3, 4
+    np.savez(tmp_path / "a.npz", events=rows)
+    code = (
+        "import resource, sys; from evplace.sources.readers import open_recording\n"
+        "recording = open_recording(sys.argv[1], (240, 180), time_unit='us')\n"
+        "first = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "print(sum(map(len, recording.packets())))\n"
+        "print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - first) >> 10)"
+    )
+    answer = subprocess.run([sys.executable, "-c", code, tmp_path / "a.npz"], capture_output=True, check=True)
+    events, megabytes = map(int, answer.stdout.split())
+    assert events == len(rows)
+    assert megabytes < 100
+    wider = np.dtype([*WIDE.descr[:-1], ("more", "V1000000")])
+    np.savez(tmp_path / "b.npz", events=np.zeros(20, wider))
+    with pytest.raises(RecordingError, match="rows of 1,000,013 bytes are no events"):
+        open_recording(tmp_path / "b.npz", (240, 180))
+
+
+@pytest.mark.parametrize("name", ["x", "t", "all"])
+@pytest.mark.parametrize("kind", ["chunked", "contiguous", "huge", "partly"])
+def test_rows_that_were_never_written(name: str, kind: str, tmp_path: Path) -> None:
+    """They read as zeros, and are claimed in any number."""
+    h5py = pytest.importorskip("h5py")
+    rows = {"t": SOME.t_us, "x": SOME.x, "y": SOME.y, "p": SOME.p.astype("u1")}
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for field, values in rows.items():
+            if name not in (field, "all"):
+                file[f"events/{field}"] = values
+                continue
+            length = 10**12 if kind == "huge" and name == "all" else len(SOME)
+            chunks = None if kind == "contiguous" else (1000,)
+            column = file.create_dataset(f"events/{field}", (length,), values.dtype, chunks=chunks)
+            if kind == "partly":
+                column[:1000] = values[:1000]
+                column[2000:3000] = values[2000:3000]
+    read = []
+    with pytest.raises(RecordingError, match=r"were never written|holds no event") as caught:
+        for packet in open_recording(tmp_path / "a.h5", (240, 180), time_unit="us").packets():
+            read.append(len(packet))
+    assert sum(read) == (1000 if kind == "partly" else 0)
+    assert not read or "from 1,001 on" in str(caught.value)
+
+
+def test_pieces_that_fill_the_memory_are_not_unpacked(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for field in "txyp":
+            column = file.create_dataset(
+                f"events/{field}", (10**8,), "i8", chunks=(10**8,), compression="gzip"
+            )
+            column[:10] = 1
+    with pytest.raises(UnsupportedError, match="packed in pieces of over 64 MiB"):
+        list(open_recording(tmp_path / "a.h5", (240, 180), time_unit="us").packets())
+
+
+def test_arrays_of_more_axes_are_no_rows(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", **dict.fromkeys("txyp", np.zeros((3, 3, 3), int)))
+    with pytest.raises(RecordingError, match="must be rows of numbers of one length"):
+        open_recording(tmp_path / "a.npz", time_unit="us")
+
+
+def test_more_topics_than_any_robot_has(tmp_path: Path) -> None:
+    path = ros2_bag(tmp_path, KIND, packet_messages(SOME, aligned=True))
+    base = sqlite3.connect(path)
+    base.executemany(
+        "INSERT INTO topics(id, name, type) VALUES (?, 't', 'x')", [(n,) for n in range(9, 20_000)]
+    )
+    base.commit()
+    base.close()
+    with pytest.raises(RecordingError, match="more than 10,000 topics"):
+        open_recording(path)
 
 
 ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT i AS id, {} FROM n"

@@ -47,6 +47,27 @@ def frozen(first: int, last: int) -> Fault:
     return make
 
 
+def frozen_with_noise(first: int, last: int) -> Fault:
+    """The receiver stands, and its position wanders by half a metre."""
+
+    def make(log: Log) -> None:
+        noise = np.random.default_rng(3).normal(0, 0.5, (2, last - first)) * DEGREES
+        log.latitude[first:last] = log.latitude[first] + noise[0]
+        log.longitude[first:last] = log.longitude[first] + noise[1]
+
+    return make
+
+
+def drift(metres: float, first: int, last: int) -> Fault:
+    """Positions that move away to one side, ever further, and are right again after the last."""
+
+    def make(log: Log) -> None:
+        aside_m = np.linspace(0, metres, last - first)
+        log.longitude[first:last] += aside_m * DEGREES / np.cos(np.deg2rad(LATITUDE))
+
+    return make
+
+
 def time_of_one(at: int, seconds: float) -> Fault:
     def make(log: Log) -> None:
         log.t_s[at] += seconds
@@ -74,14 +95,24 @@ FAULTS = {
     "frozen for 30 s": frozen(50, 80),
     "frozen for 5 s": frozen(120, 125),
     "frozen twice": lambda log: (frozen(20, 40)(log), frozen(90, 130)(log)),  # type: ignore[func-returns-value]
+    "frozen for 30 s with noise": frozen_with_noise(50, 80),
+    "ten fixes 35 m off": aside(35, 50, 60),
+    "a drift to 100 m in 20 s": drift(100, 50, 70),
+    "a drift to 100 m in 40 s": drift(100, 100, 140),
+    "a drift to 100 m in 40 s that ends near the end": drift(-100, 140, 180),
+    "a drift to 100 m in 40 s until the end": drift(100, 160, 200),
+    "a drift to 100 m in 60 s until the end": drift(100, 140, 200),
     "one time 40 s ahead": time_of_one(100, 40),
     "one time 40 s behind": time_of_one(100, -40),
     "one time 5 s ahead": time_of_one(60, 5),
     "the last time 40 s ahead": time_of_one(199, 40),
     "a clock 5 s off for 20 s": clock_for_a_while(70, 90, 5),
 }
-BY_OWN_SPEED = ("frozen for 5 s", "ten fixes 60 m off")
-"""These leave hardly a trace in a log that has no speed of its own."""
+BY_OWN_SPEED = (
+    "frozen for 5 s", "a drift to 100 m in 20 s", "a drift to 100 m in 40 s",
+    "a drift to 100 m in 40 s until the end", "a drift to 100 m in 60 s until the end",
+)  # fmt: skip
+"""These leave no trace in a log that has no speed of its own, or one that may have two causes."""
 LOGS = {"rmc": rmc_log, "csv": csv_log, "gpx": gpx_log}
 
 
@@ -134,6 +165,78 @@ def test_a_clock_that_was_set_is_asked_about(tmp_path: Path, kind: str, at: int,
     wrong, known = placed(later, log)
     assert np.nanmax(wrong) < 3
     assert known.sum() == 10 * (199 - at) + 1
+
+
+@pytest.mark.parametrize("kind", LOGS)
+@pytest.mark.parametrize(("metres", "at"), [(550, 100), (-2000, 60), (100, 140)])
+def test_positions_that_leap_for_good_are_asked_about(
+    tmp_path: Path, kind: str, metres: float, at: int
+) -> None:
+    log = Log()
+    aside(metres, at, 200)(log)
+    path = written(tmp_path, LOGS[kind](log))
+    with pytest.raises(TrackError, match=r"leaps by [\d,]+ m at .*, and not back.*`keep=after`"):
+        open_track(path)
+    track = open_track(path, keep="before")
+    wrong, known = placed(track, log)
+    assert np.nanmax(wrong) < 3
+    assert known.sum() == 10 * (at - 1) + 1
+    assert track.dropped == {"of the other side of a leap": 200 - at}
+    assert len(open_track(path, keep="after")) == 200 - at
+
+
+@pytest.mark.parametrize("kind", ["csv", "gpx"])
+@pytest.mark.parametrize(("first", "last"), [(50, 70), (100, 140)])
+def test_a_leap_back_from_a_drift_is_asked_about(tmp_path: Path, kind: str, first: int, last: int) -> None:
+    """Without a speed of the log's own, it may as well be a leap into what is wrong."""
+    log = Log()
+    drift(100, first, last)(log)
+    with pytest.raises(TrackError, match=r"leaps by 10\d m at .*, and not back"):
+        open_track(written(tmp_path, LOGS[kind](log)))
+
+
+def test_a_receiver_that_finds_its_way_after_a_gap_is_left_out_until_then(tmp_path: Path) -> None:
+    log = Log()
+    aside(-175, 100, 103)(log)
+    rows = csv_log(log).splitlines(keepends=True)
+    track = open_track(written(tmp_path, "".join(rows[:80] + rows[101:])))
+    assert len(track) == 200 - 21 - 3
+    wrong, _ = placed(track, log)
+    assert np.nanmax(wrong) < 3
+
+
+def test_a_drift_of_the_whole_log_is_told(tmp_path: Path) -> None:
+    """Its positions may be wrong, or its course."""
+    log = Log()
+    drift(300, 0, 200)(log)
+    track = open_track(written(tmp_path, rmc_log(log)))
+    assert len(track) == 200
+    assert any("keep drifting away" in note and "not checked" in note for note in track.notes)
+
+
+@pytest.mark.parametrize("longitude", [147.1, 152.9])
+def test_courses_are_those_of_the_true_north(tmp_path: Path, longitude: float) -> None:
+    """At the edges of a zone its north lies up to 3 degrees off: no drift of the positions."""
+    log = Log(600)
+    log.latitude -= 40
+    log.latitude[:] = log.latitude[0] + 3 * (log.latitude - log.latitude[0])
+    log.mps[:] *= 3
+    log.longitude += longitude - LONGITUDE
+    track = open_track(written(tmp_path, rmc_log(log)))
+    assert (len(track), track.notes) == (600, ())
+
+
+@pytest.mark.parametrize("seconds", [2, -2])
+def test_a_clock_that_slips(tmp_path: Path, seconds: int) -> None:
+    """By so little that it matters only at speed: asked about where the log's own speed proves it."""
+    log = Log()
+    log.latitude = LATITUDE + 2 * (log.latitude - LATITUDE)
+    log.mps[:] *= 2
+    log.t_s[100:] += seconds
+    with pytest.raises(TrackError, match=rf"set by \{seconds:+d} s at .*`keep=before`"):
+        open_track(written(tmp_path, rmc_log(log)))
+    notes = " ".join(open_track(written(tmp_path, csv_log(log))).notes)
+    assert f"clock slips by {seconds:+d} s at line 102" in notes
 
 
 def test_the_example_is_the_first_wrong_line(tmp_path: Path) -> None:

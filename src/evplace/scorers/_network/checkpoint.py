@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor, nn
 from torch.optim import Optimizer
 
@@ -57,7 +57,7 @@ class Checkpoint:
         for index, values in optimiser.state_dict()["state"].items():
             tensors |= {f"optimiser.{index}.{key}": value.contiguous() for key, value in values.items()}
         with new_file(self._path, overwrite=True) as partial:
-            save_file(tensors, partial, {"run": self._run, "step": str(step)})
+            partial.write_bytes(save(tensors, {"run": self._run, "step": str(step)}))
 
     def remove(self) -> None:
         """The run is over: nothing is left to go on with."""

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import MissingExtraError, PlaceMapError, SettingsError
+from evplace.scorers._network.network_onnx import LEAST, SCALE
 
 try:
     import torch
@@ -39,6 +40,8 @@ class NetworkSettings:
     gradient from its own images any more)."""
     dropout: float = 0.0
     """Share of activations dropped before each fully connected layer in training (paper: not mentioned)."""
+    own_scale: bool = False
+    """Divide each image by its own root mean square before the first layer (paper: not mentioned)."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.dropout < 1:
@@ -68,16 +71,24 @@ class Network(nn.Module):
         self.full3 = nn.Linear(int(1.5 * places), places)
         self.dropout = nn.Dropout(settings.dropout)
         self.last_relu = settings.last_relu
+        self.own_scale = settings.own_scale
 
     def forward(self, images: Tensor) -> Tensor:
         """(n, C, h, w) float32 in [0, 1] -> (n, N) logits."""
-        x = self.norm1(_pooled(self.conv1(images)))  # (n, 6, h/2, w/2)
+        x = scaled(images) if self.own_scale else images
+        x = self.norm1(_pooled(self.conv1(x)))  # (n, 6, h/2, w/2)
         x = self.norm2(_pooled(self.conv2(x)))  # (n, 16, h/4, w/4)
         x = _pooled(self.conv3(x)).flatten(1)  # (n, 32 (h/8) (w/8))
         x = torch.relu(self.full1(self.dropout(x)))  # (n, 2N)
         x = torch.relu(self.full2(self.dropout(x)))  # (n, 1.5N)
         logits: Tensor = self.full3(self.dropout(x))  # (n, N)
         return torch.relu(logits) if self.last_relu else logits
+
+
+def scaled(images: Tensor) -> Tensor:
+    """Each channel of each image with a root mean square of nearly `SCALE`; an empty one stays empty."""
+    own = images.square().mean(dim=(2, 3), keepdim=True).sqrt()
+    return images * (SCALE / (own + LEAST))
 
 
 def _pooled(x: Tensor) -> Tensor:

@@ -16,16 +16,30 @@ from evplace.core.errors import MissingExtraError, PlaceMapError
 
 OPSET = 17
 INPUT, OUTPUT = "images", "scores"
+SCALE = 0.4
+"""Root mean square of a scaled image: what busy event images have anyhow, where full scale is 1."""
+LEAST = 0.02
+"""Added to its own before: what is nearly empty is not blown up."""
+MOST_NODES, MOST_NUMBER = 64, 16
+"""How many nodes a graph has at most, and how large a number in one is: paddings, strides and kernels."""
+MOST_PIXELS = 1 << 25
+"""Numbers of an image that a network may ask for."""
 OPERATORS = frozenset(
-    ("BatchNormalization", "Cast", "Conv", "Div", "Flatten", "Gemm", "MaxPool", "Relu", "Softmax")
-)
+    (
+        "Add", "BatchNormalization", "Cast", "Conv", "Div", "Flatten", "Gemm", "GlobalLpPool", "MaxPool",
+        "Relu", "Softmax",
+    )
+)  # fmt: skip
 """What the graph is made of: a map is an input, and others could run for ever or read files."""
 Port = tuple[str, int, list[str | int]]
 """What a graph takes or gives: name, type of its numbers, shape."""
 
 
 def onnx_bytes(
-    weights: dict[str, NDArray[np.float32]], image: tuple[int, int, int], last_relu: bool
+    weights: dict[str, NDArray[np.float32]],
+    image: tuple[int, int, int],
+    last_relu: bool,
+    own_scale: bool = False,
 ) -> bytes:
     """The graph: `images` (n, C, h, w) uint8 -> `scores` (n, N) float32 softmax probabilities."""
     graph = Graph()
@@ -35,6 +49,8 @@ def onnx_bytes(
         graph.constant(name, value)
     x = graph.add("Cast", [INPUT], to=TensorProto.FLOAT)
     x = graph.add("Div", [x, graph.constant("full_scale", np.array(255, np.float32))])
+    if own_scale:
+        x = _scaled(graph, x, image[1] * image[2])
     for layer in ("1", "2", "3"):
         x = graph.add("Conv", [x, f"conv{layer}.weight", f"conv{layer}.bias"], pads=[2, 2, 2, 2])
         x = graph.add("Relu", [x])
@@ -53,6 +69,14 @@ def onnx_bytes(
     return graph.model(takes, gives)
 
 
+def _scaled(graph: Graph, x: str, pixels: int) -> str:
+    """As `scaled` of the network has it; the pool gives the root of the sum of squares."""
+    size = graph.constant("size", np.array(SCALE * np.sqrt(pixels), np.float32))
+    least = graph.constant("least", np.array(LEAST / SCALE, np.float32))
+    own = graph.add("Div", [graph.add("GlobalLpPool", [x], p=2), size])
+    return graph.add("Div", [x, graph.add("Add", [own, least])])
+
+
 def check_graph(network: bytes) -> None:
     """PlaceMapError where an ONNX graph is damaged, or holds anything but what `onnx_bytes` writes.
 
@@ -66,17 +90,28 @@ def check_graph(network: bytes) -> None:
         kinds = {kind.text for node in nodes for kind in node.parts(4)}
         foreign = {kind.text for node in nodes for kind in node.parts(7)} - {""}
         others = sorted(kinds - OPERATORS) or sorted(foreign) or ["functions of its own"] * model.has(25)
+        large = any(abs(number) > MOST_NUMBER for node in nodes for number in _numbers(node))
         elsewhere = any(graph.has(15) for graph in graphs) or any(
             one.has(13) or one.has(14) for one in tensors
         )
     except IndexError as error:
         raise PlaceMapError("the map's network is damaged: it is no ONNX graph") from error
+    if len(nodes) > MOST_NODES or large:
+        raise PlaceMapError("the map's network is none that evplace writes: layers too large, or too many")
     if others:
         raise PlaceMapError(
             f"the map's network is none that evplace writes: it holds {', '.join(others)[:99]!r}"
         )
     if elsewhere:
         raise PlaceMapError("the map's network is none that evplace writes: its weights lie in other files")
+
+
+def _numbers(node: _Message) -> Iterator[int]:
+    """The whole numbers among a node's attributes: i, and ints, packed or not."""
+    for attribute in node.parts(5):
+        for kind, value in attribute.numbers():
+            if kind in (3, 8):
+                yield value
 
 
 class _Message:
@@ -99,6 +134,17 @@ class _Message:
     def parts(self, number: int) -> list[_Message]:
         """The messages, or texts, of that number."""
         return [_Message(value) for found, value in self._fields if found == number]
+
+    def numbers(self) -> Iterator[tuple[int, int]]:
+        """Number of the field and value of each whole number, also of those in a packed row."""
+        for found, value in self._fields:
+            if isinstance(value, int):
+                yield found, _signed(value)
+            elif found == 8 and isinstance(value, memoryview):
+                at = 0
+                while at < len(value):
+                    packed, at = _varint(value, at)
+                    yield found, _signed(packed)
 
     def has(self, number: int) -> bool:
         """Whether there is a field of that number."""
@@ -123,6 +169,11 @@ def _fields(message: memoryview) -> Iterator[tuple[int, object]]:
         if at > len(message):
             raise IndexError("cut off")
         yield key >> 3, value
+
+
+def _signed(value: int) -> int:
+    """A number as 64 bits hold it."""
+    return value - (1 << 64) if value >> 63 else value
 
 
 def _varint(message: memoryview, at: int) -> tuple[int, int]:

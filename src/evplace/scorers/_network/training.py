@@ -6,6 +6,7 @@ ends in the same weights.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -33,13 +34,14 @@ def train_network(
     import torch
     from torch.nn.functional import cross_entropy
 
-    from evplace.scorers._network.augmentation import in_another_light
+    from evplace.scorers._network.augmentation import augmented
     from evplace.scorers._network.checkpoint import Checkpoint, fingerprint
     from evplace.scorers._network.network import Network, NetworkSettings, to_input, weights_of
 
     torch.manual_seed(settings.seed)
     device = "cuda" if torch.cuda.is_available() else "cpu"
-    network = Network(n_places, image_shape(images), NetworkSettings(settings.last_relu, settings.dropout))
+    structure = NetworkSettings(settings.last_relu, settings.dropout, settings.own_scale)
+    network = Network(n_places, image_shape(images), structure)
     # torch's own types know no `to` with a device and a memory format, which it has.
     network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
     optimiser = _optimiser(network, settings)
@@ -52,13 +54,12 @@ def train_network(
         batches(len(chosen), settings.batch, settings.seed, first, steps), first + 1
     ):
         torch.manual_seed(settings.seed + step)  # what is drawn, too, depends on the step alone
+        set_rate(optimiser, settings, (step - 1) / steps)
         index = np.sort(chosen[batch])
         target = torch.from_numpy(labels[index]).to(device)
-        inputs = to_input(images[index], device)
-        if settings.augment == "light":
-            inputs = in_another_light(inputs)
+        inputs = augmented(to_input(images[index], device), settings.augment)
         with torch.autocast(device, torch.bfloat16, enabled=_bfloat16(settings, device)):
-            loss = cross_entropy(network(inputs), target)
+            loss = cross_entropy(network(inputs), target, label_smoothing=settings.label_smoothing)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         optimiser.step()
@@ -86,8 +87,15 @@ def image_shape(images: NDArray[np.uint8]) -> tuple[int, int, int]:
 def _optimiser(network: Network, settings: Settings) -> torch.optim.Optimizer:
     import torch
 
-    kind = torch.optim.Adam if settings.optimiser == "adam" else torch.optim.SGD
-    return kind(network.parameters(), lr=settings.learning_rate)
+    kind = torch.optim.AdamW if settings.optimiser == "adam" else torch.optim.SGD
+    return kind(network.parameters(), lr=settings.learning_rate, weight_decay=settings.weight_decay)
+
+
+def set_rate(optimiser: torch.optim.Optimizer, settings: Settings, done: float) -> None:
+    """The learning rate where a share `done` of the steps has been taken: it hangs on nothing else."""
+    falls = settings.schedule == "cosine"
+    for group in optimiser.param_groups:
+        group["lr"] = settings.learning_rate * (0.5 * (1 + math.cos(math.pi * done)) if falls else 1)
 
 
 def _bfloat16(settings: Settings, device: str) -> bool:

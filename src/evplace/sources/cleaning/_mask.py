@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import DamagedRecordingError, InputError, RecordingError
 from evplace.core.events import Events, Size
-from evplace.core.storage import read_array
+from evplace.core.storage import is_stream, read_array
 from evplace.sources.cleaning._pixels import Mask, count_pixels, hot_pixels, static_pixels
 from evplace.sources.cleaning._settings import CleaningSettings
 
@@ -69,6 +69,8 @@ def read_mask(given: MaskSource, size: Size) -> Mask:
 
 
 def _loaded(path: Path, name: str) -> NDArray[Any]:
+    if is_stream(path):
+        raise RecordingError(f"{name} is a pipe or a device: masks are read from files, so save it first")
     try:
         with path.open("rb") as file:
             is_array = file.read(6) == b"\x93NUMPY"

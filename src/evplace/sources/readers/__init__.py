@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 from evplace.core import families
 from evplace.core.errors import EvplaceError, RecordingError, UnsupportedError
 from evplace.core.events import Size
+from evplace.core.storage import is_stream
 from evplace.sources.readers._foreign import foreign
 from evplace.sources.readers._source import Block, Hints, Source, checked_source
 
@@ -118,6 +119,10 @@ def _head(path: Path) -> bytes:
     """The first bytes of a file; empty for a folder."""
     if path.is_dir():
         return b""
+    if is_stream(path):
+        raise RecordingError(
+            f"{path} is a pipe or a device: recordings are read from files, so save it first"
+        )
     try:
         with path.open("rb") as file:
             head = file.read(HEAD)

@@ -19,8 +19,12 @@ from evplace.sources.readers._source import Hints
 
 SAMPLE = 1 << 16
 """Rows from which the columns of a table are told."""
+SLICE_BYTES = 1 << 25
+"""Bytes of an array that are read at a time, at most."""
 MOST_COLUMNS = 8
 """A table of events has four columns or a few more."""
+MOST_BYTES = 1 << 12
+"""An event takes no more than this, whatever else stands beside it."""
 PAIRS = {"xy", "coordinates", "coords"}
 """Words for arrays of x and y side by side."""
 
@@ -67,7 +71,10 @@ def layouts(
         )
         if layout is not None:
             found[name] = layout
-    rows = _of_rows(kinds) if hints.columns is None else None
+    try:
+        rows: Layout | str | None = _of_rows(kinds) if hints.columns is None else None
+    except _order.UnclearError as error:
+        rows = str(error)
     return found | ({"": rows} if rows is not None else {})
 
 
@@ -135,10 +142,20 @@ def checked(where: str, layout: Layout, kinds: Mapping[str, Kind]) -> int:
     lengths, dtypes = set(), set()
     for field in layout.fields.values():
         kind = kinds[field.array]
+        if len(kind.shape) != (1 if field.column is None else 2):
+            lengths |= {-1, 0}  # which fit nothing
         flat = field.column is None or is_upright(kind)
         lengths.add(kind.shape[0] if kind.shape and flat else kind.shape[-1] if kind.shape else 0)
         dtypes.add((kind.dtype if field.name is None else kind.dtype[field.name]).kind)
+        if kind.dtype.itemsize > MOST_BYTES:
+            raise RecordingError(f"{where}: rows of {kind.dtype.itemsize:,} bytes are no events")
     if not dtypes <= set("biuf") or len(lengths) != 1:
         held = sorted({kinds[field.array].shape for field in layout.fields.values()})
         raise RecordingError(f"{where}: t, x, y and p must be rows of numbers of one length, not {held}")
     return int(lengths.pop())
+
+
+def per_slice(layout: Layout, kinds: Mapping[str, Kind], most: int) -> int:
+    """How many events are read at a time: `most`, or fewer where one takes many bytes."""
+    widest = max(kinds[field.array].dtype.itemsize for field in layout.fields.values())
+    return min(most, SLICE_BYTES // max(widest, 1))

@@ -24,8 +24,8 @@ from evplace.sources.readers._source import Block, Hints, Source
 WORK_S = 8.0
 """Seconds of its own work within which this process gives a block; beyond that it goes round in circles. They
 are counted where the system can: a busy machine must not make a good recording look damaged."""
-MEMORY = 4 << 30
-"""Bytes of address space that it may take, where the system can limit it; a block needs far less."""
+MEMORY = 1 << 29
+"""Bytes that it may take for what it reads, where the system can limit it; a block needs far less."""
 SLICE = 1 << 19
 """Events that a message carries at most."""
 FRAME = struct.Struct("<cqq")
@@ -34,10 +34,10 @@ FRAME = struct.Struct("<cqq")
 def main() -> None:
     """Decode what the job names."""
     job, pipe = received(), sys.stdout.buffer
-    limit_memory()
     limit_work()
     try:
         reader = importlib.import_module(f"evplace.sources.readers.{job['reader']}")
+        limit_memory()
         hints = job["hints"]
         size, columns = (None if hints[name] is None else tuple(hints[name]) for name in ("size", "columns"))
         known = Hints(size, hints["time_unit"], hints["stream"], columns)
@@ -52,13 +52,15 @@ def main() -> None:
 
 
 def limit_memory() -> None:
-    """Have the system refuse this process more than MEMORY, and keep no image of its crash."""
+    """Have the system refuse this process more than MEMORY from now on, and keep no image of its crash."""
     if sys.platform != "win32":
         import resource
 
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        if sys.platform != "darwin":
-            resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        if sys.platform == "linux":
+            pages = int(Path("/proc/self/statm").read_text().split()[5])
+            most = pages * resource.getpagesize() + MEMORY
+            resource.setrlimit(resource.RLIMIT_DATA, (most, most))
 
 
 def limit_work() -> None:

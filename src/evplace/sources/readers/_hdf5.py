@@ -34,6 +34,7 @@ from evplace.core.events import Size
 from evplace.sources.readers import _arrays, _columns, _hdf5_packets
 from evplace.sources.readers._arrays import Kind, Layout
 from evplace.sources.readers._hdf5_links import arrays_in, outside
+from evplace.sources.readers._hdf5_storage import written
 from evplace.sources.readers._source import Block, Hints, Source, ordered, printable
 
 EVENTS = 1 << 19
@@ -221,16 +222,20 @@ def _blocks(path: Path, found: _Found, unit: str, offset_us: int) -> Iterator[Bl
 
 
 def _slices(file: h5py.File, found: _Found) -> Iterator[dict[str, NDArray[Any]]]:
-    """Slices of the fields, EVENTS long; each array is read once for all of its fields."""
+    """Slices of the fields, up to EVENTS long; each array is read once for all of its fields."""
     group, layout = file[found.group], found.layout
     length = _arrays.checked(found.group, layout, found.kinds)
     upright = {
         name: _is_rows(found.kinds[name]) for name in {field.array for field in layout.fields.values()}
     }
-    for start in range(0, length, EVENTS):
-        part = slice(start, min(start + EVENTS, length))
+    events = _arrays.per_slice(layout, found.kinds, EVENTS)
+    stored = min(written(group[name], 0 if rows else 1) for name, rows in upright.items())
+    for start in range(0, min(length, stored), events):
+        part = slice(start, min(start + events, length, stored))
         read = {name: group[name][part if rows else (slice(None), part)] for name, rows in upright.items()}
         yield {field: _picked(read[at.array], at, upright[at.array]) for field, at in layout.fields.items()}
+    if stored < length:
+        raise ValueError(f"of {length:,} events, those from {stored + 1:,} on were never written")
 
 
 def _is_rows(kind: Kind) -> bool:

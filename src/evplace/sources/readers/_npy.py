@@ -120,7 +120,7 @@ def _slices(
                 file = stack.enter_context(opened(field.array))
                 files[key] = file, _row(_header(file, field.array))
                 file.seek((key[1] or 0) * kind.shape[-1] * kind.dtype.itemsize if kind.shape else 0, 1)
-        left = _arrays.checked("", layout, kinds)
+        left, events = _arrays.checked("", layout, kinds), _arrays.per_slice(layout, kinds, events)
         while left > 0:
             parts = {key: _take(*files[key], min(left, events)) for key in files}
             count = min(map(len, parts.values()))

@@ -82,12 +82,14 @@ def said(columns: Sequence[str]) -> Order:
 def named(names: Sequence[str]) -> dict[str, int]:
     """Field -> the place of the name that stands for it, for as many fields as have one.
 
-    The time is t, or sec with nsec or usec.
+    The time is t, or sec with nsec or usec. Raises UnclearError where several columns have one name.
     """
     small = [name.strip().lower() for name in names]
     found: dict[str, int] = {}
     for field, words in WORDS.items():
         exact = [small.index(name) for name in NAMES.get(field, ()) if name in small]
+        if exact and small.count(small[exact[0]]) > 1:
+            raise UnclearError(f"several columns are called '{small[exact[0]]}'")
         likely = [n for n, name in enumerate(small) if set(words_of(name)) & words]
         likely = [n for n in likely if "event" in small[n]] or likely
         if exact or len(likely) == 1:

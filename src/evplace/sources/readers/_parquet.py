@@ -18,6 +18,10 @@ from evplace.sources.readers._source import Block, Hints, Source, printable
 
 EVENTS = 1 << 18
 """Events read at a time."""
+THREADS = 4
+"""One a column: each takes memory of its own, whatever the machine has."""
+BUFFER = 1 << 20
+"""Bytes of a column read ahead; without it, a group of rows is read whole."""
 FAULTS = (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError)
 """What reading a damaged file raises."""
 
@@ -25,6 +29,8 @@ FAULTS = (pyarrow.ArrowException, OSError, ValueError, KeyError, TypeError)
 def open_here(path: Path, hints: Hints) -> Source:
     """The columns and the unit of time; RecordingError where they are missing or not clear."""
     try:
+        pyarrow.set_cpu_count(THREADS)
+        pyarrow.set_io_thread_count(1)
         with pyarrow.parquet.ParquetFile(path) as file:
             names = list(file.schema_arrow.names)
             order = _order_of(path, names, hints)
@@ -44,7 +50,10 @@ def _order_of(path: Path, names: list[str], hints: Hints) -> _order.Order:
     """The columns as the caller says, else by their names."""
     if hints.columns is not None and len(hints.columns) == len(names):
         return _order.said(hints.columns)
-    order = _order.complete(_order.named(names))
+    try:
+        order = _order.complete(_order.named(names))
+    except _order.UnclearError as error:
+        raise RecordingError(f"{path}: {error}: give each column a name of its own") from error
     if order is None or hints.columns is not None:
         held = printable(", ".join(names))
         raise RecordingError(f"{path}: columns t, x, y and p are needed; it holds {held}")
@@ -60,7 +69,7 @@ def _unit(path: Path, columns: dict[str, str], stated: Any, hints: Hints) -> tup
 
 
 def _slices(path: Path, columns: dict[str, str]) -> Iterator[dict[str, NDArray[Any]]]:
-    with pyarrow.parquet.ParquetFile(path) as file:
+    with pyarrow.parquet.ParquetFile(path, buffer_size=BUFFER, pre_buffer=False) as file:
         for batch in file.iter_batches(EVENTS, columns=list(columns.values())):
             yield {field: _numbers(batch.column(name), field == "t") for field, name in columns.items()}
 

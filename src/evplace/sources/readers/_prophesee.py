@@ -19,6 +19,9 @@ _PLAIN = re.compile(rb"%[^\x00-\x08\x0e-\x1f\x7f\n]*\n")
 """A line that may be text of any encoding: data that starts like a header seldom goes on like one."""
 _END = re.compile(rb"%[ \t]*end[ \t]*\r?\n")
 
+_DIGITS = 9
+"""Digits that are read of a number which may have any number of them."""
+
 
 class Header(NamedTuple):
     """The text lines that start a file."""
@@ -75,7 +78,7 @@ def stated_size(fields: dict[str, str]) -> Size | None:
     found = next((pair for pair in pairs if pair), None)
     if found is None:
         return None
-    width, height = int(found.group(1)), int(found.group(2))
+    width, height = (int(side[:_DIGITS]) for side in found.groups())
     if not (0 < width <= 1 << 16 and 0 < height <= 1 << 16):
         raise RecordingError(f"the header states a sensor of {width}x{height} pixels: give the `size`")
     return width, height

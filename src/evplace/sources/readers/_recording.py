@@ -107,6 +107,11 @@ class Recording:
         return self._source.size is not None
 
     @property
+    def turn_us(self) -> int:
+        """Microseconds after which the file's clock starts anew; 0 where it never does."""
+        return self._source.turn_us
+
+    @property
     def wraps(self) -> int:
         """How often the file's clock started anew between the first and the last event delivered so far."""
         turn_us, zero_us = self._source.turn_us, self._source.zero_us

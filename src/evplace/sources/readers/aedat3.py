@@ -51,7 +51,7 @@ def read(path: Path, hints: Hints) -> Source:
         found = coding.group(1).decode("ascii", "replace")
         raise UnsupportedError(f"{path} is packed as {found}: AEDAT 3 can be read as RAW only")
     start = end + len(END)
-    known = {int(n): name.decode("ascii") for n, name in re.findall(rb"#Source (\d+): (\w+)", head[:end])}
+    known = {int(n): name.decode("ascii") for n, name in re.findall(rb"#Source (\d{1,4}): (\w+)", head[:end])}
     number, streams = numbered(
         path, {n: known.get(n, "") for n in _senders(path, start, known)}, hints.stream
     )

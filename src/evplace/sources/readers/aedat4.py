@@ -53,7 +53,7 @@ def read(path: Path, hints: Hints) -> Source:
     """The file header; RecordingError where it is damaged, UnsupportedError without a stream of events."""
     try:
         header = _header(path)
-    except (struct.error, ValueError, IndexError, KeyError, ElementTree.ParseError) as error:
+    except (struct.error, ValueError, LookupError, ElementTree.ParseError) as error:
         raise RecordingError(
             f"{path}: the AEDAT 4 header is damaged ({error}): no event can be read"
         ) from error

@@ -23,6 +23,8 @@ ABOUT = "ROS 2 bag (SQLite) with event messages"
 MAGIC = b"SQLite format 3\0"
 STEPS, MOST_STEPS = 1_000_000, 500
 """SQLite's own steps after which it is asked whether to go on, and how often it may be for one row."""
+MOST_TOPICS = 10_000
+"""More than any robot has."""
 FAULTS = (sqlite3.Error, ValueError, TypeError, OverflowError)
 """What reading a damaged file raises."""
 
@@ -91,9 +93,12 @@ def _rows(base: sqlite3.Connection, query: str, *values: object) -> Iterator[tup
 
 def _named(base: sqlite3.Connection) -> dict[int, tuple[str, str]]:
     """Number -> name and type of a topic."""
+    rows = list(_rows(base, f"SELECT id, name, type FROM topics LIMIT {MOST_TOPICS + 1}"))
+    if len(rows) > MOST_TOPICS:
+        raise ValueError(f"it has more than {MOST_TOPICS:,} topics")
     return {
         number: (printable(str(name)), printable(str(kind)).replace("/msg/", "/"))
-        for number, name, kind in _rows(base, "SELECT id, name, type FROM topics")
+        for number, name, kind in rows
     }
 
 

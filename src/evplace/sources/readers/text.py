@@ -46,6 +46,8 @@ FAULTS = (
     ValueError,
 )
 """What unpacking a damaged archive raises."""
+MOST_COLUMNS = 64
+"""A line of more numbers than this is no event."""
 SIZE = re.compile(r"(?:geometry|resolution|sensor|size)\D{0,3}(\d{1,5})\s*[x, ]\s*(\d{1,5})\b", re.IGNORECASE)
 """A remark that states width and height."""
 
@@ -158,7 +160,7 @@ def _top(head: bytes) -> _Top | None:
         line = raw.decode("utf-8", "replace").strip(" \t\r")
         words = _cells(line)
         remark = re.match(r"[#%]+", line)
-        if remark is None and len(words) >= 4 and all(map(_is_number, words)):
+        if remark is None and 4 <= len(words) <= MOST_COLUMNS and all(map(_is_number, words)):
             return _Top(position, number, line, names, size or _size_of_names(names))
         stated = SIZE.search(line) if remark else re.fullmatch(r"(\d{1,5})[\s,;]+(\d{1,5})", line)
         if stated is not None and (remark is not None or number == 0):

@@ -12,10 +12,10 @@ from pathlib import Path
 
 from evplace.core import families, settings
 from evplace.core.errors import EvplaceError, SettingsError, TrackError
+from evplace.core.storage import is_stream
 from evplace.sources._times import DAY_US, day_of
 from evplace.sources.tracks import bag
-from evplace.sources.tracks._fixes import Fixes
-from evplace.sources.tracks._order import Keep
+from evplace.sources.tracks._fixes import Fixes, Keep
 from evplace.sources.tracks._track import MAX_SPEED_MPS, Track
 
 __all__ = ["Fixes", "Track", "format_of", "open_track"]
@@ -45,9 +45,10 @@ def open_track(
 
     Fixes that cannot be used are left out, counted in `Track.dropped` and shown in `Track.notes`: those
     without a position, and those that cannot be true, as no vehicle goes faster than `max_speed_mps` or
-    otherwise than its log's own speed and course say. Where the log's clock was set on the way, `keep`
-    ("before", "after") says which side is right. A slow drift of the positions cannot be seen in a log: it
-    is not checked. A log that breaks off gives its good part, and `Track.fault` says so.
+    otherwise than its log's own speed and course say. Where the log's clock was set on the way, or its
+    positions leapt for good, `keep` ("before", "after") says which side is right. A slow drift of the
+    positions shows only against a speed and course of the log's own: else it is not checked. A log that
+    breaks off gives its good part, and `Track.fault` says so.
 
     Raises TrackError where the file cannot be read or holds no usable fix, SettingsError for a setting.
     """
@@ -84,6 +85,8 @@ def format_of(path: Path) -> str:
     """The name of the format of a log, by the file's first bytes; TrackError where none is known."""
     if path.is_dir() and bag.recognises_folder(path):
         return "bag"
+    if is_stream(path):
+        raise TrackError(f"{path} is a pipe or a device: logs are read from files, so save it first")
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES)

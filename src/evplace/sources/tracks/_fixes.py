@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,8 @@ from evplace.sources._times import DAY_US
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Keep = Literal["before", "after"]
+"""Which side is right where a log's clock was set, or its positions leapt for good."""
 
 _SHOWN = 90
 """Characters of a line that are shown as an example."""

@@ -2,11 +2,12 @@
 
 Wrong fixes are found by what stands around them: where a log jumps away and back, the stretch between is
 left out, whichever it is, so that as many fixes as can be remain. What leaves no trace in a log, a slow
-drift of the positions for example, cannot be found.
+drift of the positions where it has no speed and course of its own, cannot be found.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,51 +16,60 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import TrackError
 from evplace.sources._times import DATED_US
-from evplace.sources.tracks._fixes import Bools, Fixes, Floats
+from evplace.sources.tracks._fixes import Bools, Fixes, Floats, Keep
+from evplace.sources.tracks._leaps import Leaps
+from evplace.sources.tracks._steps import (
+    AROUND,
+    BASE_US,
+    FEWEST,
+    MOVING_MPS,
+    NEAR_US,
+    SLACK_M,
+    around,
+    knots,
+    steps,
+    velocities,
+)
 
-MOVING_MPS = 2.0
-"""Above this speed a vehicle moves for sure."""
-SLACK_M = 10.0
-"""Noise and the receiver's own corrections move a fix by up to this."""
 WAY_M = 5 * SLACK_M
 """A way against which noise is nothing."""
-STILL_MPS = 1.0
-"""Below this speed positions move by their noise alone."""
+HELD_M = 5.0
+"""Positions of a receiver that stands differ by less, by their noise."""
 OWN_SLACK_M = 25.0
 """By so much positions may differ from where the log's own speed and course lead from the one before."""
 STEPS_SLACK_M = 50.0
 """The same, where the log has no speed and the steps around stand for it."""
 DRIFT_MPS = 1.0
 """And by so much more for each second between them."""
-BASE_US = 1_000_000
-"""Speed is taken over about this long: over less, noise of a metre is more than the movement."""
-NEAR_US = 3_000_000
-"""Fixes further apart than this say nothing of the speed between them."""
+DRIFT_M = 15.0
+"""By so much positions may lie off the way that those before have kept to."""
+WANDER_MPS, WANDER = 0.2, 0.01
+"""And that way wanders by so much a second, and by so much a metre."""
 FAR_S = 60.0
 """Nor do speeds on the way say where a fix further away than this can be."""
 FROZEN = 0.2
 """A step this much shorter than the log's own speed makes it is none."""
-FEWEST = 5
-"""Steps without which the log's own speed is not judged."""
 UNITS = {"m/s": 1.0, "knots": 1852 / 3600, "km/h": 1 / 3.6, "miles/h": 0.44704}
 """Metres a second in one of each unit of speed."""
 AGREES = 1.25
 """How much the log's own speed may differ from that of its positions, as a factor."""
-AROUND = 5
-"""Steps before and after by which a step is judged."""
 _WORK = 100_000_000
 """Pairs of fixes that are looked at, at most."""
 
 
-def possible(fixes: Fixes, max_speed_mps: float) -> Fixes:
-    """The fixes, in the order of time and in metres, that can be true; the others are counted.
+def possible(fixes: Fixes, max_speed_mps: float, keep: Keep | None = None, zone: int = 0) -> Fixes:
+    """The fixes, in the order of time and in metres of a UTM zone, that can be true; the others are counted.
 
-    Raises TrackError where fewer than half can be.
+    Raises TrackError where fewer than half can be, or where the log leaps for good and `keep` does not say
+    which side of that is right.
     """
     speed = own_speed(fixes)
     frozen = _frozen(fixes, speed) | _held(fixes, max_speed_mps)
     fixes, speed = fixes.without(frozen, "repeated while moving"), speed[~frozen]
-    kept = _chain(fixes, speed, max_speed_mps)
+    other = Leaps.of(fixes).other_side(keep)
+    fixes, speed = fixes.without(other, "of the other side of a leap"), speed[~other]
+    own = _own_velocity(fixes, speed, zone)
+    kept = _by_leaps(fixes, speed, max_speed_mps) if own is None else _by_way(fixes, own, max_speed_mps)
     few = 2 * kept.sum() < len(np.unique(fixes.t_us))
     if few or _usual_mps(fixes[kept]) > max_speed_mps:
         raise TrackError(_too_fast(fixes, max_speed_mps))
@@ -67,10 +77,39 @@ def possible(fixes: Fixes, max_speed_mps: float) -> Fixes:
     return _split(fixes, kept, max_speed_mps, f"against {by}")
 
 
+def _by_way(fixes: Fixes, velocity: Floats, max_speed_mps: float) -> Bools:
+    """(N,) the fixes that go together where the log's own speed and course say how it moved."""
+    way = Way.of(fixes, velocity, OWN_SLACK_M)
+    loose = _chain(fixes, way, max_speed_mps)
+    if np.median(np.hypot(*velocity[np.isfinite(velocity[:, 0])].T)) < MOVING_MPS:
+        return loose  # on foot, where noise is more than the movement
+    kept = _chain(fixes, way, max_speed_mps, DRIFT_M)
+    if 2 * kept.sum() >= loose.sum():
+        Leaps.of(fixes).ask(~kept)
+        return kept
+    fixes.notes.append(
+        "the positions keep drifting away from where the log's own speed and course lead: one of the two is "
+        "wrong, and a log cannot tell which, so that the drift is not checked"
+    )
+    return loose
+
+
+def _by_leaps(fixes: Fixes, speed: Floats, max_speed_mps: float) -> Bools:
+    """(N,) the fixes that go together where only the movement around them says how it goes on."""
+    kept = ~Leaps.of(fixes).wrong()
+    if not kept.any():
+        return kept
+    rest, speed = fixes[kept], speed[kept]
+    own = bool(np.isfinite(speed).any())
+    way = Way.of(rest, _along(rest, speed) if own else _around(rest), OWN_SLACK_M if own else STEPS_SLACK_M)
+    kept[kept] = _chain(rest, way, max_speed_mps)
+    return kept
+
+
 def own_speed(fixes: Fixes) -> Floats:
     """(N,) the log's own speed in m/s, in the unit that fits its positions; NaN where unknown or unfit."""
-    at = _knots(fixes)
-    step_m, step_s = _steps(fixes[at])
+    at = knots(fixes)
+    step_m, step_s = steps(fixes[at])
     said = np.diff(_summed(_between(fixes.speed, np.diff(fixes.t_us) / 1e6))[at])
     used = (step_s <= NEAR_US / 1e6) & (step_m > 0) & (said > MOVING_MPS * step_s)
     nothing = np.full(len(fixes), np.nan)
@@ -86,18 +125,6 @@ def own_speed(fixes: Fixes) -> Floats:
         )
         return nothing
     return fixes.speed * UNITS[unit]
-
-
-def _steps(fixes: Fixes) -> tuple[Floats, Floats]:
-    """(N - 1,) metres and seconds from each fix to the next."""
-    assert fixes.xy is not None
-    return np.hypot(*np.diff(fixes.xy, axis=0).T), np.diff(fixes.t_us) / 1e6
-
-
-def _knots(fixes: Fixes) -> NDArray[np.int64]:
-    """Fixes about a second apart, or further where the log has no others."""
-    _, first = np.unique(fixes.t_us // BASE_US, return_index=True)
-    return first
 
 
 def _between(values: Floats, span_s: Floats) -> Floats:
@@ -128,20 +155,29 @@ def _frozen(fixes: Fixes, speed: Floats) -> Bools:
 
 def _held(fixes: Fixes, max_speed_mps: float) -> Bools:
     """(N,) which fixes stand still and are followed by a leap to where moving on would have led."""
-    at = _knots(fixes)
-    step_m, step_s = _steps(fixes[at])
-    held = np.zeros(len(fixes), np.bool_)
-    mps = step_m / np.maximum(step_s, 1e-6)
-    moves = np.flatnonzero(mps > STILL_MPS)
-    for n in np.flatnonzero(np.diff(moves) > 1) + 1:  # steps that end a stretch without movement
-        first, last = moves[n - 1] + 1, moves[n]
-        around = np.concatenate([mps[moves[max(n - AROUND, 0) : n]], mps[moves[n + 1 : n + 1 + AROUND]]])
-        usual = float(np.median(around)) if len(around) > AROUND else 0.0
-        through = step_m[last] / step_s[first : last + 1].sum()
+    at = knots(fixes)
+    xy, t_s = fixes[at].xy, fixes.t_us[at] / 1e6
+    assert xy is not None
+    step_m, step_s = steps(fixes[at])
+    held, mps = np.zeros(len(fixes), np.bool_), step_m / np.maximum(step_s, 1e-6)
+    for first, last in _standing(xy):
+        around = np.concatenate([mps[max(first - AROUND, 0) : first], mps[last + 1 : last + 1 + AROUND]])
+        usual = float(np.median(around)) if len(around) >= FEWEST else 0.0
+        through = float(np.hypot(*(xy[last + 1] - xy[first]))) / (t_s[last + 1] - t_s[first])
         leaps = mps[last] > min(1.5 * usual + SLACK_M, max_speed_mps)
-        if usual > MOVING_MPS and leaps and through > usual / 3:
+        if usual > MOVING_MPS and leaps and usual / 3 < through < 2 * usual + SLACK_M:
             held[at[first] + 1 : at[last + 1]] = True
     return held
+
+
+def _standing(xy: Floats) -> Iterator[tuple[int, int]]:
+    """First and last of positions (N, 2) that lie together and are followed by one elsewhere."""
+    first = 0
+    for n in range(1, len(xy)):
+        if np.hypot(*(xy[n] - xy[first])) > HELD_M:
+            if n - 1 > first:
+                yield first, n - 1
+            first = n
 
 
 class Way(NamedTuple):
@@ -156,35 +192,45 @@ class Way(NamedTuple):
     slack_m: float
     """By how much positions may differ from it."""
 
+    @classmethod
+    def of(cls, fixes: Fixes, velocity: Floats, slack_m: float) -> Way:
+        """By the velocity (N, 2) at each fix, in metres a second."""
+        step_s = np.diff(fixes.t_us) / 1e6
+        known = (step_s <= NEAR_US / 1e6) & np.isfinite(velocity[1:] + velocity[:-1]).all(axis=1)
+        return cls(
+            _summed(_between(velocity, step_s)),
+            _summed(_between(np.hypot(*velocity.T), step_s)),
+            _summed((~known).astype(np.int64)),
+            slack_m,
+        )
 
-def _way(fixes: Fixes, speed: Floats) -> Way:
-    step_s = np.diff(fixes.t_us) / 1e6
-    own = bool(np.isfinite(speed).any())
-    velocity = _velocity(fixes, speed) if own else _around(fixes)
-    known = (step_s <= NEAR_US / 1e6) & np.isfinite(velocity[1:] + velocity[:-1]).all(axis=1)
-    return Way(
-        _summed(_between(velocity, step_s)),
-        _summed(_between(np.hypot(*velocity.T), step_s)),
-        _summed((~known).astype(np.int64)),
-        OWN_SLACK_M if own else STEPS_SLACK_M,
-    )
 
-
-def _velocity(fixes: Fixes, speed: Floats) -> Floats:
-    """(N, 2) metres a second by the log's own speed and course, or along the steps where it has no course."""
-    course = np.deg2rad(np.where(speed > MOVING_MPS, fixes.heading_deg, 0.0))
+def _own_velocity(fixes: Fixes, speed: Floats, zone: int) -> Floats | None:
+    """(N, 2) metres a second by the log's own speed and course; None where these do not fit its positions."""
+    north_deg = _north_deg(fixes, zone)
+    course = np.deg2rad(np.where(speed > MOVING_MPS, fixes.heading_deg - north_deg, 0.0))
     own: Floats = speed[:, None] * np.column_stack([np.sin(course), np.cos(course)])
-    if _fits(own, fixes):
-        return own
+    return own if _fits(own, fixes) else None
+
+
+def _north_deg(fixes: Fixes, zone: int) -> Floats:
+    """(N,) degrees by which the north of a UTM zone lies clockwise from the true one."""
+    if not zone:
+        return np.zeros(len(fixes))
+    east: Floats = fixes.longitude - (6 * zone - 183)
+    return np.asarray(east * np.sin(np.deg2rad(fixes.latitude)), np.float64)
+
+
+def _along(fixes: Fixes, speed: Floats) -> Floats:
+    """(N, 2) metres a second at the log's own speed along the steps around each fix."""
     around = _around(fixes)
-    along: Floats = around / np.maximum(np.hypot(*around.T), 1e-9)[:, None]
-    return np.asarray(along * speed[:, None], np.float64)
+    return np.asarray(around / np.maximum(np.hypot(*around.T), 1e-9)[:, None] * speed[:, None], np.float64)
 
 
 def _fits(own: Floats, fixes: Fixes) -> bool:
     """Whether the log's own velocities (N, 2) point as its positions move: most within 45 degrees."""
     assert fixes.xy is not None
-    at = _knots(fixes)
+    at = knots(fixes)
     moved = np.diff(fixes.xy[at], axis=0)
     fast = np.hypot(*own[at[1:]].T) * np.hypot(*moved.T)
     used = fast > MOVING_MPS**2  # False where NaN
@@ -194,26 +240,28 @@ def _fits(own: Floats, fixes: Fixes) -> bool:
 
 def _around(fixes: Fixes) -> Floats:
     """(N, 2) metres a second: the middle of the AROUND seconds before and after each fix; NaN without any."""
-    assert fixes.xy is not None
-    at = _knots(fixes)
-    span_s = np.diff(fixes.t_us[at]) / 1e6
-    near = span_s <= NEAR_US / 1e6
-    steps = np.diff(fixes.xy[at], axis=0) / np.where(near, span_s, np.nan)[:, None]
-    padded = np.pad(steps, ((AROUND, AROUND), (0, 0)), constant_values=np.nan)
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * AROUND, axis=0)
-    found = np.full((len(at), 2), np.nan)
-    some = np.isfinite(windows).sum(axis=2).min(axis=1) >= FEWEST
-    found[some] = np.nanmedian(windows[some], axis=2)
+    at = knots(fixes)
+    found = around(velocities(fixes, at))
     return np.column_stack([np.interp(fixes.t_us, fixes.t_us[at], found[:, n]) for n in (0, 1)])
 
 
-def _chain(fixes: Fixes, speed: Floats, max_speed_mps: float) -> Bools:
-    """(N,) the most fixes of which each can be reached from the one before; of equals, the shortest way."""
+def _chain(fixes: Fixes, way: Way, max_speed_mps: float, drift_m: float = np.inf) -> Bools:
+    """(N,) the most fixes of which each can be reached from the one before; of equals, the shortest way.
+
+    `drift_m` is by how much they may lie off the way that those before have kept to.
+    """
     assert fixes.xy is not None
     look = int(min(len(fixes), max(200, _WORK // max(len(fixes), 1))))
-    way = _way(fixes, speed)
     kept: Bools = _longest(
-        fixes.t_us, fixes.xy, way.xy, way.metres, way.unknown, way.slack_m, float(max_speed_mps), look
+        fixes.t_us,
+        fixes.xy,
+        way.xy,
+        way.metres,
+        way.unknown,
+        way.slack_m,
+        drift_m,
+        float(max_speed_mps),
+        look,
     )
     return kept
 
@@ -290,14 +338,30 @@ def _reachable(
 
 
 @njit(cache=True)
+def _anchor(
+    i: int, j: int, t_us: NDArray[np.int64], off: Floats, anchors: Floats, way_m: Floats,
+    unknown: NDArray[np.int64],
+) -> tuple[float, float]:  # fmt: skip
+    """Where a chain that goes on from fix i has its way at fix j: it follows its fixes slowly."""
+    span_s, way = (t_us[j] - t_us[i]) / 1e6, way_m[j] - way_m[i]
+    if unknown[j] > unknown[i]:
+        return off[j, 0], off[j, 1]
+    by = WANDER_MPS * span_s + WANDER * way if way > MOVING_MPS * span_s else DRIFT_MPS * span_s
+    east, north = off[j, 0] - anchors[i, 0], off[j, 1] - anchors[i, 1]
+    share = min(1.0, by / max(np.hypot(east, north), 1e-9))
+    return anchors[i, 0] + share * east, anchors[i, 1] + share * north
+
+
+@njit(cache=True)
 def _longest(
     t_us: NDArray[np.int64], xy: Floats, way_xy: Floats, way_m: Floats, unknown: NDArray[np.int64],
-    slack_m: float, max_mps: float, look: int,
+    slack_m: float, drift_m: float, max_mps: float, look: int,
 ) -> NDArray[np.bool_]:  # fmt: skip
     """Dynamic programming over the fixes; a better chain is looked for no further back than one can be."""
     n = len(t_us)
     count, most, before = np.ones(n, np.int64), np.ones(n, np.int64), np.full(n, -1)
-    length = np.zeros(n)
+    length, off = np.zeros(n), xy - way_xy
+    anchors = off.copy()
     for j in range(n):
         for i in range(j - 1, max(j - look, 0) - 1, -1):
             if most[i] + 1 < count[j]:
@@ -308,7 +372,10 @@ def _longest(
             if (more or shorter) and _reachable(
                 i, j, metres, t_us, xy, way_xy, way_m, unknown, slack_m, max_mps
             ):
-                count[j], length[j], before[j] = count[i] + 1, length[i] + metres, i
+                east, north = _anchor(i, j, t_us, off, anchors, way_m, unknown)
+                if np.hypot(off[j, 0] - east, off[j, 1] - north) <= drift_m:
+                    count[j], length[j], before[j] = count[i] + 1, length[i] + metres, i
+                    anchors[j] = east, north
         most[j] = max(count[j], most[j - 1]) if j else count[j]
     best = 0
     for j in range(n):

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from evplace.core.errors import TrackError
-from evplace.sources.tracks._fixes import Fixes
-from evplace.sources.tracks._order import Keep, in_order
+from evplace.sources.tracks._fixes import Fixes, Keep
+from evplace.sources.tracks._order import in_order
 
 _MIN_SPEED_MPS = 1.0
 """Below this the direction of movement is mostly GPS noise."""
@@ -85,7 +85,7 @@ class Track:
         """The fixes that can be true, in one UTM zone: `zone` and `northern`, or those of the middle fix.
 
         One wrong fix does not matter: it is left out, counted and shown. `max_speed_mps` is the fastest that
-        the vehicle goes; `keep` the side that is right where the log's clock was set.
+        the vehicle goes; `keep` the side that is right where the log's clock was set, or its positions leapt.
         Raises TrackError where no fix is usable, or most cannot be true or lie too far from the zone.
         """
         from evplace.sources.tracks._possible import possible  # compiles: not needed without a log
@@ -94,7 +94,7 @@ class Track:
             fixes, zone, northern = _in_zone(_known(fixes), zone, northern)
         else:
             fixes, zone, northern = _finite(fixes), 0, True
-        good = possible(in_order(fixes, keep), max_speed_mps)
+        good = possible(in_order(fixes, keep), max_speed_mps, keep, zone)
         assert good.xy is not None
         easting, northing = np.ascontiguousarray(good.xy.T)
         heading = _heading(good.t_us, easting, northing, good.heading_deg)

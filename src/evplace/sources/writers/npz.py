@@ -37,11 +37,19 @@ def write(path: Path, packets: Iterable[Events], size: Size) -> None:
         with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
             for file, (name, dtype) in zip(files, FIELDS, strict=True):
                 file.seek(0)
-                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                with archive.open(_member(name), "w", force_zip64=True) as member:
                     member.write(_header(dtype, (count,)))
                     shutil.copyfileobj(file, member, 1 << 20)
             for name, value in zip(("width", "height"), size, strict=True):
-                archive.writestr(f"{name}.npy", _header(np.dtype(np.int64), ()) + np.int64(value).tobytes())
+                archive.writestr(_member(name), _header(np.dtype(np.int64), ()) + np.int64(value).tobytes())
+
+
+def _member(name: str) -> zipfile.ZipInfo:
+    """An array's place in the archive, always of one date: the same events give the same bytes."""
+    member = zipfile.ZipInfo(f"{name}.npy")  # of 1980, where zip archives begin
+    member.compress_type = zipfile.ZIP_DEFLATED
+    member.external_attr = 0o600 << 16
+    return member
 
 
 def _header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
