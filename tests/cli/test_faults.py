@@ -238,7 +238,7 @@ def test_a_map_of_other_settings_or_of_another_sensor(folder: Path, street: Path
 def test_a_flipped_byte_in_a_map(folder: Path, capsys: Capture, name: str) -> None:
     pytest.importorskip("torch", reason="the network needs the extra 'train'")
     arguments = ["train", f"{folder}/day.aedat4", "--track", f"{folder}/day.csv", "-o", f"{folder}/m"]
-    assert main([*arguments, "--steps", "1", "--batch", "4"]) == 0
+    assert main([*arguments, "--scorer", "network", "--steps", "1", "--batch", "4"]) == 0
     file = folder / "m" / name
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 4
@@ -437,7 +437,16 @@ sys.exit(main(sys.argv[1:]))
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_training_that_was_stopped_goes_on(folder: Path, how: signal.Signals) -> None:
     pytest.importorskip("torch", reason="the network needs the extra 'train'")
-    day = ["train", folder / "day.aedat4", "--track", folder / "day.csv", "--batch", "8"]
+    day = [
+        "train",
+        folder / "day.aedat4",
+        "--track",
+        folder / "day.csv",
+        "--scorer",
+        "network",
+        "--batch",
+        "8",
+    ]
     command = [*map(str, [*day, "--steps", "60"]), "-o"]
     waiting, pipe = [sys.executable, "-c", WAITS_ONCE_SAVED, *command, folder / "stopped"], subprocess.PIPE
     alone = {**os.environ, "OMP_NUM_THREADS": "1"}  # more threads wait for each other on a busy machine

@@ -24,7 +24,7 @@ from evplace.core import families
 from evplace.core.errors import SettingsError
 
 Capture = pytest.CaptureFixture[str]
-TAKE_SETTINGS = ("city", "doctor", "evaluate", "images", "localize", "match", "simulate", "train")
+TAKE_SETTINGS = ("city", "doctor", "evaluate", "images", "localize", "match", "serve", "simulate", "train")
 
 
 def in_force(capsys: Capture, *words: object) -> dict[str, tuple[object, str]]:
@@ -178,7 +178,8 @@ def test_the_settings_of_a_tracks_format(tmp_path: Path, toml: Path, capsys: Cap
     [
         ("train", ("--scorer", "nc"), families.names("scorers")),
         ("match", ("--matcher", "fab-map"), families.names("matchers")),
-        ("localize", ("--set", "k=5"), ["K", "tau1", "last_item"]),
+        ("localize", ("--set", "k=5"), ["false_accept", "lag_s"]),
+        ("localize", ("--matcher", "local", "--set", "k=5"), ["K", "tau1", "last_item"]),
         ("evaluate", ("--matcher", "graph", "--set", "k=5"), ["K", "alpha"]),
         ("train", ("--scorer", "ncc", "--set", "width=wide"), ["'wide'"]),
         ("train", ("--preset", "night"), ["notebook", "paper"]),
@@ -261,12 +262,12 @@ TOML = st.recursive(
 @pytest.mark.parametrize(
     ("command", "text", "flags", "wanted"),
     [
-        ("train", 'preset = "moon"', (), "{}: the scorer 'network' has no preset 'moon'"),
+        ("train", 'preset = "moon"', (), "{}: there is no preset 'moon'"),
         (
             "train",
             'preset = "sun"',
             ("--preset", "moon"),
-            "evplace: the scorer 'network' has no preset 'moon'",
+            "evplace: there is no preset 'moon'",
         ),
         ("train", 'scorer = "moon"', (), "{}: 'moon' is none of the scorers"),
         ("train", 'scorer = "sun"', ("--scorer", "moon"), "evplace: 'moon' is none of the scorers"),
@@ -398,7 +399,17 @@ def test_nothing_is_done_where_settings_are_shown(tmp_path: Path, toml: Path, ca
 def test_settings_of_parts_are_checked_before_the_work(tmp_path: Path, capsys: Capture) -> None:
     for words in (
         ("train", "none.aedat4", "-o", tmp_path / "m", "--scorer", "ncc", "--set", "width=wide"),
-        ("evaluate", "none.evp", "none.aedat4", "-o", tmp_path / "r", "--set", "K=wide"),
+        (
+            "evaluate",
+            "none.evp",
+            "none.aedat4",
+            "-o",
+            tmp_path / "r",
+            "--matcher",
+            "local",
+            "--set",
+            "K=wide",
+        ),
         ("simulate", "none.mp4", "-o", tmp_path / "s.npz", "--set", "threshold_on=wide"),
     ):
         assert "cannot be 'wide'" in fault(capsys, *words)

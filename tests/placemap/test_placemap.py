@@ -139,7 +139,7 @@ def test_the_default_is_the_best_and_the_preset_paper_the_papers(day: Traverse, 
     pytest.importorskip("torch", reason="the network needs the extra 'train'")
     paper = train(day, places, preset="paper", steps=1)
     assert (type(paper.scorer), paper.matcher) == (scorers.Network, Local.presets["paper"])
-    with pytest.raises(SettingsError, match="no preset 'moon'"):
+    with pytest.raises(SettingsError, match="there is no preset 'moon'"):
         train(day, places, preset="moon")
 
 

@@ -100,7 +100,7 @@ def test_a_signal_ends_it_well(folder: Path, tmp_path: Path, sent: signal.Signal
     from websockets.sync.client import connect
 
     came, lines = tmp_path / "came.raw", tmp_path / "lines"
-    more = ("--source-set", "loops=0", "--record", str(came), "--json", str(lines))
+    more = ("--source-set", "loops=0", "--record", str(came), "--lines", str(lines))
     with running(folder, "--source", str(folder / "night.raw"), *more) as service:
         service.until(localised)
         with connect(service.address.replace("http", "ws") + "live") as listener:
@@ -120,7 +120,7 @@ def test_it_ends_with_its_source_where_it_is_told_to(
     folder: Path, image_map: PlaceMap, night_drive: Drive
 ) -> None:
     """The lines are the matches of the same recording offline."""
-    more = ("--source-set", "speed=0", "--json", "-", "--stop-at-end")
+    more = ("--source-set", "speed=0", "--lines", "-", "--stop-at-end")
     with running(folder, "--source", str(folder / "night.raw"), *more) as service:
         code, out, _ = service.ended()
     assert code == 0
@@ -131,7 +131,7 @@ def test_it_ends_with_its_source_where_it_is_told_to(
 
 
 def test_standard_input_is_a_source(folder: Path, night_drive: Drive) -> None:
-    with running(folder, "--source", "-", "--json", "-", "--stop-at-end") as service:
+    with running(folder, "--source", "-", "--lines", "-", "--stop-at-end") as service:
         assert service.process.stdin is not None
         service.process.stdin.buffer.write((folder / "night.raw").read_bytes())
         service.process.stdin.close()
@@ -175,7 +175,7 @@ def test_a_sender_that_is_killed_is_missed_and_found_again(folder: Path) -> None
 
 
 def test_garbage_on_the_network_changes_nothing(folder: Path, night_drive: Drive) -> None:
-    with running(folder, "--source", "udp:0", "--json", "-") as service:
+    with running(folder, "--source", "udp:0", "--lines", "-") as service:
         assert service.process.poll() is None
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_one:
         any_one.bind(("127.0.0.1", 0))

@@ -7,7 +7,7 @@ Examples:
   evplace serve --map campus.evp --source zenoh:/event_camera/events --zenoh evplace
   evplace serve --map campus.evp --source night.aedat4 --source-set speed=2 --source-set loops=0
   faery input file night.aedat4 output udp 127.0.0.1:3333   another program sends, `udp:3333` receives
-  evplace serve --map campus.evp --source usb: --json - --nmea udp:127.0.0.1:10110
+  evplace serve --map campus.evp --source usb: --lines - --nmea udp:127.0.0.1:10110
   evplace list live                                         the kinds of sources
 """
 
@@ -88,7 +88,7 @@ class Args(SettingsFlags):
     """Write what comes to this file: .raw, .aedat4 or .h5."""
     overwrite: bool = False
     """Replace that file where it exists."""
-    json: str | None = None
+    lines: str | None = None
     """Also write a JSON object a match: to - (standard output), a file, a device, or udp:HOST:PORT."""
     nmea: str | None = None
     """Also write NMEA sentences (GGA and RMC): to -, a file, a device, or udp:HOST:PORT."""
@@ -130,7 +130,7 @@ def opened(args: Args) -> Iterator[Service]:
     with contextlib.ExitStack() as stack:
         stack.callback(service.close)
         for text, place in (
-            (lambda report: service.describer.text(service.describer.values(report)) + "\n", args.json),
+            (lambda report: service.describer.text(service.describer.values(report)) + "\n", args.lines),
             (lambda report: sentences(report, place_map), args.nmea),
         ):
             if place is not None:

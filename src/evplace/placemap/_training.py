@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core import families
-from evplace.core.errors import PartError
+from evplace.core.errors import PartError, SettingsError
 from evplace.imaging.activity import activity
 from evplace.imaging.traverse import Traverse
 from evplace.matchers import Matcher, RouteMatcher, Rows
@@ -19,6 +19,7 @@ from evplace.matchers.local import Local
 from evplace.placemap import Items, PlaceMap
 from evplace.places import Places
 from evplace.scorers import Descriptor, Learned, Learning, Scorer, scorer_of, usable
+from evplace.scorers.fused import Fused
 from evplace.scorers.network import Network
 
 
@@ -50,8 +51,15 @@ def train(
 
 
 def default_scorer(preset: str | None) -> str:
-    """The scorer where none is named: the one that a preset is of."""
-    return "network" if preset in Network.presets else "fused"
+    """The scorer where none is named: the one that a preset is of; SettingsError where it is of neither."""
+    if preset is None or preset in Fused.presets:
+        return "fused"
+    if preset in Network.presets:
+        return "network"
+    known = ", ".join(sorted({*Fused.presets, *Network.presets}))
+    raise SettingsError(
+        f"there is no preset '{preset}': known are {known}; others are of a scorer that is named"
+    )
 
 
 def default_matcher(place_map: PlaceMap) -> Matcher:
