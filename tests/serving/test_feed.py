@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,8 +51,14 @@ def events_of(packets: list[Packet]) -> Events:
     return Events.concatenate([packet.events for packet in packets])
 
 
+def unchecked(t_us: Sequence[int], x: Sequence[int], y: Sequence[int]) -> Events:
+    """Events as a source may send them, in any order and anywhere."""
+    columns = np.array(t_us, np.int64), np.array(x, np.uint16), np.array(y, np.uint16)
+    return Events(*columns, np.ones(len(t_us), np.bool_), SIZE)
+
+
 def at(t_us: list[int]) -> Block:
-    return block(Events.of(t_us, [1] * len(t_us), [1] * len(t_us), [True] * len(t_us), SIZE))
+    return block(unchecked(t_us, [1] * len(t_us), [1] * len(t_us)))
 
 
 def sifted(sieve: Sieve, times: list[list[int]], pace: float = 1.0) -> tuple[list[int], int]:
@@ -83,7 +90,7 @@ def test_good_events_pass_unchanged(drive: Events) -> None:
 
 def test_what_is_outside_the_sensor_or_runs_backwards_is_left_out_and_counted() -> None:
     source = Made()
-    source.put(block(Events.of([1, 2, 3, 2, 4], [1, 99, 1, 1, 1], [1, 1, 1, 1, 77], [True] * 5, SIZE)))
+    source.put(block(unchecked([1, 2, 3, 2, 4], [1, 99, 1, 1, 1], [1, 1, 1, 1, 77])))
     source.end()
     feed = Feed(source, SIZE)
     feed.start()
@@ -161,7 +168,7 @@ def test_a_mark_is_not_lost_with_the_events_that_carried_it(drive: Events) -> No
 
 def test_large_blocks_are_handed_on_in_parts() -> None:
     count = 2 * PACKET + 5
-    events = Events.of(np.arange(count), np.zeros(count), np.zeros(count), np.ones(count), SIZE)
+    events = unchecked(range(count), [0] * count, [0] * count)
     source = Made()
     source.put(block(events))
     source.end()
