@@ -36,7 +36,7 @@ def with_hot_pixels(drive: Drive, rate_hz: float = 400.0) -> Drive:
     n = int(rate_hz * events.t_us[-1] / 1e6)
     hot = [
         Events.of(
-            rng.integers(1, events.t_us[-1], n),
+            np.sort(rng.integers(1, events.t_us[-1], n)),
             np.full(n, x),
             np.full(n, y),
             rng.random(n) < 0.5,
