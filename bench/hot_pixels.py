@@ -62,9 +62,10 @@ class HotPixels:
             start_us = int(events.t_us[-1])
             counts = rng.poisson(self.rate_hz * (start_us - first) / 1e6)
             n = int(counts.sum())
+            pixels = rng.permutation(np.repeat(np.arange(len(self.x)), counts))
             own = Events.of(
-                rng.uniform(first, start_us, n).astype(np.int64), np.repeat(self.x, counts),
-                np.repeat(self.y, counts), rng.random(n) < 0.5, events.size,
+                np.sort(rng.uniform(first, start_us, n).astype(np.int64)), self.x[pixels], self.y[pixels],
+                rng.random(n) < 0.5, events.size,
             )  # fmt: skip
             both = Events.concatenate([events, own])
             order = np.argsort(both.t_us, kind="stable")

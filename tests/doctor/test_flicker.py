@@ -17,8 +17,7 @@ def lamp(frequency_hz: float, seconds: float = 2.0, seed: int = 0) -> Events:
     phases = np.tile([0.05, 0.15, 0.55, 0.65], n) + np.repeat(np.arange(n), 4)
     t_us = ((phases + rng.normal(0, 0.03, 4 * n)) * 1e6 / frequency_hz).clip(0).astype(np.int64)
     x, y = rng.integers(32, 48, 4 * n), rng.integers(16, 32, 4 * n)
-    p = np.tile([True, True, False, False], n)
-    order = np.argsort(t_us, kind="stable")
+    order, p = np.argsort(t_us, kind="stable"), np.tile([True, True, False, False], n)
     return Events.of(t_us[order], x[order], y[order], p[order], SIZE)
 
 

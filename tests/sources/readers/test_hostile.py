@@ -330,3 +330,24 @@ def test_a_packet_that_claims_256_mib(tmp_path: Path) -> None:
     with pytest.raises(DamagedRecordingError, match=f"the packet at byte {size}"):
         list(recording.packets())
     assert recording.events == len(SOME)
+
+
+def test_a_page_that_is_cut_off_is_no_page_of_zeros(tmp_path: Path) -> None:
+    """SQLite would give its messages with zeros for what is missing."""
+    path = ros2_bag(tmp_path, KIND, packet_messages(some_events(300), aligned=True))
+    whole = Events.concatenate(list(open_recording(path, (240, 180)).packets()))
+    data = path.read_bytes()
+    for at in range(len(data) - 4095, len(data), 97):
+        path.write_bytes(data[:at])
+        times: list[int] = []
+        with pytest.raises(RecordingError):
+            for packet in open_recording(path, (240, 180)).packets():
+                times += packet.t_us.tolist()
+        assert times == whole.t_us[: len(times)].tolist()
+
+
+def test_a_message_about_names_of_any_length_is_short(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", **{"x" * 30_000: [1]})
+    with pytest.raises(RecordingError) as caught:
+        open_recording(tmp_path / "a.npz")
+    assert len(str(caught.value)) < 700

@@ -159,4 +159,4 @@ def _blocks(path: Path, opened: Open, kinds: dict[str, Kind], layout: Layout, un
         for rows in _slices(opened, kinds, layout):
             yield _columns.of_rows(rows, unit, layout.part_ns)
     except FAULTS as error:
-        raise DamagedRecordingError(f"{path} breaks off: {error}") from error
+        raise DamagedRecordingError(f"{path} breaks off: {printable(str(error))}") from error

@@ -33,6 +33,7 @@ class BagFile:
         self.most = path.stat().st_size * (RATIO if self.packed else 1) + (LIMIT if self.packed else 0)
         """Bytes that there may be at most."""
         self._unpacked: Path | None = None
+        self._cut: Path | None = None
 
     def stream(self) -> BinaryIO:
         """From its start to its end, without a way back where it is packed."""
@@ -54,6 +55,18 @@ class BagFile:
                     file.write(part)
             self._unpacked = Path(name)
         return self._unpacked
+
+    def upto(self, length: int) -> Path:
+        """Where its first `length` bytes lie, in a temporary file that goes with this object."""
+        if self._cut is None:
+            number, name = tempfile.mkstemp(prefix="evplace-", suffix=".db3")
+            weakref.finalize(self, Path(name).unlink, missing_ok=True)
+            with os.fdopen(number, "wb") as file, self.place().open("rb") as whole:
+                while length > 0 and (part := whole.read(min(PART, length))):
+                    length -= len(part)
+                    file.write(part)
+            self._cut = Path(name)
+        return self._cut
 
     def _parts(self) -> Iterator[bytes]:
         """Its content up to where it breaks off, which whoever reads it will find out."""

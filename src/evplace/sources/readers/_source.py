@@ -88,9 +88,14 @@ def numbered(path: Path, cameras: Mapping[int, str], wanted: str | None) -> tupl
     return next(n for n, name in names.items() if name == streams[0]), streams
 
 
+SHOWN = 400
+"""Characters of a name, or of a list of them, that are shown."""
+
+
 def printable(name: str) -> str:
-    """A name out of a file on one line, without the codes that move a terminal's cursor."""
-    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in name)
+    """A name out of a file on one short line, without the codes that move a terminal's cursor."""
+    shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in name[: SHOWN + 1])
+    return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}..."
 
 
 def gathered(blocks: Iterator[Block], events: int = 1 << 15) -> Iterator[Block]:

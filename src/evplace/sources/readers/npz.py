@@ -15,7 +15,7 @@ from typing import IO
 from evplace.core.errors import RecordingError
 from evplace.core.events import Size
 from evplace.sources.readers import _npy
-from evplace.sources.readers._source import Hints, Source
+from evplace.sources.readers._source import Hints, Source, printable
 from evplace.sources.readers._zip import members
 
 ABOUT = "numpy archive (.npz) with arrays t, x, y, p"
@@ -35,7 +35,7 @@ def read(path: Path, hints: Hints) -> Source:
         names = tuple(name.removesuffix(".npy") for name in members(path, ".npy"))
         return _npy.source(path, names, partial(_opened, path), _size(path, names), hints)
     except _npy.FAULTS as error:
-        raise RecordingError(f"{path} is a damaged numpy archive: {error}") from error
+        raise RecordingError(f"{path} is a damaged numpy archive: {printable(str(error))}") from error
 
 
 @contextmanager

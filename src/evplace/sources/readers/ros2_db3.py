@@ -23,6 +23,8 @@ ABOUT = "ROS 2 bag (SQLite) with event messages"
 MAGIC = b"SQLite format 3\0"
 STEPS, MOST_STEPS = 1_000_000, 500
 """SQLite's own steps after which it is asked whether to go on, and how often it may be for one row."""
+PAGE = 1 << 16
+"""Bytes of a page of which the header says 1."""
 MOST_TOPICS = 10_000
 """More than any robot has."""
 FAULTS = (sqlite3.Error, ValueError, TypeError, OverflowError)
@@ -69,7 +71,7 @@ def _messages(files: list[BagFile]) -> Iterator[Message]:
 
 
 def _opened(file: BagFile) -> sqlite3.Connection:
-    base = sqlite3.connect(f"{file.place().resolve().as_uri()}?mode=ro&immutable=1", uri=True)
+    base = sqlite3.connect(f"{_whole_pages(file).resolve().as_uri()}?mode=ro&immutable=1", uri=True)
     base.execute("PRAGMA writable_schema = ON")  # nothing is written; else no page of a cut file is read
     base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LIMIT)
     tables = base.execute("SELECT name FROM sqlite_master WHERE type = 'table' AND sql NOT LIKE '%VIRTUAL%'")
@@ -80,6 +82,16 @@ def _opened(file: BagFile) -> sqlite3.Connection:
             f"{file.path} is no ROS 2 bag: it has no table {' and no table '.join(sorted(missing))}"
         )
     return base
+
+
+def _whole_pages(file: BagFile) -> Path:
+    """The file, or a copy without its last page where that is cut: SQLite takes zeros for the rest."""
+    place = file.place()
+    with place.open("rb") as opened:
+        page = int.from_bytes(opened.read(18)[16:], "big")
+    size = place.stat().st_size
+    rest = size % (page if page > 1 else PAGE)
+    return file.upto(size - rest) if rest else place
 
 
 def _rows(base: sqlite3.Connection, query: str, *values: object) -> Iterator[tuple[Any, ...]]:

@@ -96,7 +96,7 @@ def read(path: Path, hints: Hints) -> Source:
         streams = ordered(path, streams, hints.stream) if streams else []
         layout = _layout(path, streams[0] if streams else held[0] if held else None, hints)
     except FAULTS as error:
-        raise RecordingError(f"{path} cannot be unpacked: {error}") from error
+        raise RecordingError(f"{path} cannot be unpacked: {printable(str(error))}") from error
     if layout is None:
         raise RecordingError(f"{path}: no line holds t, x, y and p: give `columns=t,x,y,p` in their order")
     sample = _time_sample(path, layout)
@@ -286,7 +286,7 @@ def _parsed(
                     return
                 lines, kept = lines + seen, text[end:]
     except FAULTS as error:
-        raise DamagedRecordingError(f"{path} breaks off: {error}") from error
+        raise DamagedRecordingError(f"{path} breaks off: {printable(str(error))}") from error
 
 
 def _blocks(path: Path, layout: _Layout, unit: str) -> Iterator[Block]:
