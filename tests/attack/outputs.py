@@ -46,7 +46,7 @@ COMMANDS: dict[str, tuple[list[str], Callable[[Path], object]]] = {
     "images": (["images", "day.aedat4", "-o", "images", "--track", "day.csv"], Traverse.load),
     "map": (["train", "day.aedat4", "--track", "day.csv", "-o", "map", "--scorer", "ncc"], PlaceMap.load),
     "net": (
-        ["train", "day.aedat4", "--track", "day.csv", "-o", "net", "--steps", "5", "--batch", "4"],
+        ["train", "day.aedat4", "--track", "day.csv", "-o", "net", "--scorer", "network", "--steps", "5", "--batch", "4"],
         PlaceMap.load,
     ),
     "result": (["evaluate", "given.map", "day.aedat4", "--track", "day.csv", "-o", "result"], Result.load),
