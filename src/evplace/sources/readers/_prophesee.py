@@ -44,7 +44,7 @@ def header(head: bytes) -> Header:
     for line in lines:
         words = line.decode("utf-8", "replace")[1:].split(maxsplit=1)
         if words:
-            fields[words[0].lower()] = printable(words[1].strip()) if len(words) > 1 else ""
+            fields[words[0].lower()] = printable(words[1].strip(), len(head)) if len(words) > 1 else ""
     return Header(fields, position)
 
 

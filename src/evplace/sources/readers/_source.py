@@ -92,10 +92,10 @@ SHOWN = 400
 """Characters of a name, or of a list of them, that are shown."""
 
 
-def printable(name: str) -> str:
+def printable(name: str, most: int = SHOWN) -> str:
     """A name out of a file on one short line, without the codes that move a terminal's cursor."""
-    shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in name[: SHOWN + 1])
-    return shown if len(shown) <= SHOWN else f"{shown[:SHOWN]}..."
+    shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in name[: most + 1])
+    return shown if len(shown) <= most else f"{shown[:most]}..."
 
 
 def gathered(blocks: Iterator[Block], events: int = 1 << 15) -> Iterator[Block]:
