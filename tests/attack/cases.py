@@ -75,7 +75,7 @@ def main(kind: str, name: str, seed: int, first: int, count: int, board: Path) -
 
 
 def _megabytes() -> int:
-    """The most that this process has held; `ru_maxrss` would count what its parent held when it was started."""
+    """The most that this process has held; `ru_maxrss` would count what its parent held at its start."""
     status = Path("/proc/self/status")
     if not status.exists():
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10
