@@ -49,7 +49,10 @@ class Reader:
         return Found(int(item), float(self._read[0]), signs_of(self._read))
 
     def uncertainty_m(self, belief: Floats, item: int) -> float:
-        """Radius around the item that holds LIKELY of the belief; NaN where items have no positions."""
+        """Radius around the item that holds LIKELY of the belief, but no less than half a step between items.
+
+        NaN where items have no positions.
+        """
         if not self.ways.in_metres:
             return math.nan
         held = np.flatnonzero(belief > HELD)
@@ -58,7 +61,8 @@ class Reader:
         away = np.hypot(*(self.ways.xy[held] - self.ways.xy[item]).T)
         order = np.argsort(away)
         share = np.cumsum(belief[held[order]])
-        return float(away[order[np.searchsorted(share, LIKELY * share[-1])]])
+        radius = float(away[order[np.searchsorted(share, LIKELY * share[-1])]])
+        return max(radius, self.ways.spacing / 2)
 
     def others(self, belief: Floats, item: int) -> list[tuple[int, float]]:
         """The next best items at other places, and the belief around each."""
