@@ -73,7 +73,7 @@ class Args(TrackFlags, DriveFlags):
     """A setting of the scorer, as name=value."""
     preset: Annotated[str | None, a_preset_of("scorers")] = None
     """best: fused, without training. paper: the paper's network, trained as printed, and its Algorithm 1;
-    notebook: trained as the author's notebook does. Or a preset of the scorer that is named."""
+    notebook: as the author's notebook does; tuned: as good as we get it. Or one of a scorer that is named."""
     train: Annotated[TrainSettings, tyro.conf.arg(name="")] = field(default_factory=TrainSettings)
     windows: Annotated[WindowSettings, tyro.conf.arg(name="")] = field(default_factory=WindowSettings)
     images: Annotated[ImageSettings, tyro.conf.arg(name="")] = field(default_factory=ImageSettings)

@@ -46,7 +46,7 @@ function explained(m) {
   if (m.item !== null && m.state !== "no-events" && map && map.along[m.item] !== null) {
     parts.push(`${Math.round(map.along[m.item])} m along the route`);
   }
-  if (m.probability !== null) parts.push(`${percent(m.probability)} sure`);
+  if (m.probability !== null) parts.push(m.probability > 0.999 ? "more than 99.9 % sure" : `${percent(m.probability)} sure`);
   if (m.last && !SURE.includes(m.state)) parts.push(`last at place ${m.last.place}`);
   if (m.state === "no-events" && m.silent_s >= 1) parts.push(`none for ${m.silent_s.toFixed(0)} s`);
   return parts.join(" · ");
