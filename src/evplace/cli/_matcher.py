@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 from evplace.cli._output import note
+from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.core.errors import EvplaceError
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap, remembered
@@ -17,7 +19,7 @@ NOT_MEASURED = (
 """Said of a map whose matcher is calibrated where that can be."""
 
 
-def of_map(args: Any) -> str:
+def _of_map(args: Any) -> str:
     """The name of the matcher that `args.map` remembers; of a map that cannot be read, the usual one."""
     try:
         return remembered(Path(args.map))
@@ -25,10 +27,28 @@ def of_map(args: Any) -> str:
         return "bayes"
 
 
-def settings_of_matcher(args: Any) -> dict[str, object]:
-    """The settings that flags give, those with flags of their own among them."""
-    own = {name: getattr(args, name) for name in ("false_accept", "lag_s")}
-    return dict(args.set) | {name: value for name, value in own.items() if value is not None}
+@dataclass(frozen=True, kw_only=True)
+class MatcherFlags(SettingsFlags):
+    """How score rows become answers."""
+
+    PARTS: ClassVar[tuple[Part, ...]] = (Part.of("matchers", "matcher", preset="preset", usual=_of_map),)
+
+    matcher: Annotated[str | None, a_part_of("matchers")] = None
+    """How score rows become answers; `evplace list matchers` says what each does. Default: as the map
+    remembers."""
+    preset: Annotated[str | None, a_preset_of("matchers")] = None
+    """A preset of the matcher."""
+    false_accept: float | None = None
+    """For bayes: the share of the images of places never seen that may be accepted. (0.01)"""
+    lag_s: float | None = None
+    """For bayes: seconds that an answer waits for what comes next; it is better then. (0)"""
+    set: Pairs = ()
+    """A setting of the matcher, as name=value: K=5, tau1=0.99, tau2=0.01 for local."""
+
+    def matcher_settings(self) -> dict[str, object]:
+        """The settings that flags give, those with flags of their own among them."""
+        own = {"false_accept": self.false_accept, "lag_s": self.lag_s}
+        return dict(self.set) | {name: value for name, value in own.items() if value is not None}
 
 
 def is_measured(place_map: PlaceMap) -> bool:

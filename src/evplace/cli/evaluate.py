@@ -17,10 +17,10 @@ from typing import Annotated, ClassVar, Literal
 
 import tyro
 
-from evplace.cli._matcher import note_matches, of_map, settings_of_matcher
+from evplace.cli._matcher import MatcherFlags, note_matches
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses, print_facts, print_json
 from evplace.cli._recording import DriveFlags
-from evplace.cli._settings import Pairs, Part, a_part_of, a_preset_of
+from evplace.cli._settings import Part
 from evplace.cli._track import TrackFlags
 from evplace.core.errors import MissingExtraError, SettingsError
 from evplace.core.storage import check_new_folder
@@ -47,11 +47,11 @@ ROWS: dict[str, Literal["queries", "references"]] = {
 
 
 @dataclass(frozen=True)
-class Args(TrackFlags, DriveFlags):
+class Args(MatcherFlags, TrackFlags, DriveFlags):
     """Flags of `evplace evaluate`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (
-        *TrackFlags.PARTS, Part.of("matchers", "matcher", preset="preset", usual=of_map),
+        *TrackFlags.PARTS, *MatcherFlags.PARTS,
     )  # fmt: skip
 
     map: tyro.conf.Positional[Path]
@@ -73,17 +73,6 @@ class Args(TrackFlags, DriveFlags):
     """For --rule radius: metres that an answer may be away."""
     answers: Literal["live", "hindsight"] = "live"
     """live: what the camera would have known as it drove. hindsight: what is known once it has arrived."""
-    matcher: Annotated[str | None, a_part_of("matchers")] = None
-    """How score rows become answers; `evplace list matchers` says what each does. Default: as the map
-    remembers."""
-    preset: Annotated[str | None, a_preset_of("matchers")] = None
-    """A preset of the matcher."""
-    false_accept: float | None = None
-    """For bayes: the share of the images of places never seen that may be accepted. (0.01)"""
-    lag_s: float | None = None
-    """For bayes: seconds that an answer waits for what comes next; it is better then. (0)"""
-    set: Pairs = ()
-    """A setting of the matcher, as name=value."""
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
     reference: Path | None = None
@@ -106,7 +95,7 @@ def run(args: Args) -> int:
     if args.frames is not None and args.frames < 0:
         raise SettingsError(f"--frames is how many items off an answer may be, 0 or more, not {args.frames}")
     place_map = PlaceMap.load(args.map)
-    where = Localizer(place_map, args.matcher, args.preset, args.mask, **settings_of_matcher(args))
+    where = Localizer(place_map, args.matcher, args.preset, args.mask, **args.matcher_settings())
     query = _opened(args, place_map)
     reference = Traverse.load(args.reference) if args.reference is not None else None
     truth = _truth(args, place_map, query)

@@ -20,14 +20,13 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import tyro
 
-from evplace.cli._matcher import note_matches, of_map, settings_of_matcher
+from evplace.cli._matcher import MatcherFlags, note_matches
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.cli._recording import DriveFlags
-from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.core.errors import DamagedRecordingError, SettingsError
 from evplace.core.storage import new_file
 from evplace.drives.to_traverse import Reading, open_source_for, recorded_as
@@ -48,26 +47,13 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Args(SettingsFlags, DriveFlags):
+class Args(MatcherFlags, DriveFlags):
     """Flags of `evplace localize`."""
-
-    PARTS: ClassVar[tuple[Part, ...]] = (Part.of("matchers", "matcher", preset="preset", usual=of_map),)
 
     map: tyro.conf.Positional[Path]
     """A map that `evplace train` wrote."""
     source: tyro.conf.Positional[Path]
     """An event recording, a video, a folder of images, a data set or a traverse folder."""
-    matcher: Annotated[str | None, a_part_of("matchers")] = None
-    """How score rows become answers; `evplace list matchers` says what each does. Default: as the map
-    remembers."""
-    preset: Annotated[str | None, a_preset_of("matchers")] = None
-    """A preset of the matcher."""
-    false_accept: float | None = None
-    """For bayes: the share of the images of places never seen that may be accepted. (0.01)"""
-    lag_s: float | None = None
-    """For bayes: seconds that an answer waits for what comes next; it is better then. (0)"""
-    set: Pairs = ()
-    """A setting of the matcher, as name=value: K=5, tau1=0.99, tau2=0.01 for local."""
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Write a .csv file instead of standard output."""
     mask: Path | None = None
@@ -128,7 +114,7 @@ class _Drive:
 def run(args: Args) -> int:
     """Localise and print, or write, the matches."""
     where = Localizer(
-        PlaceMap.load(args.map), args.matcher, args.preset, args.mask, **settings_of_matcher(args)
+        PlaceMap.load(args.map), args.matcher, args.preset, args.mask, **args.matcher_settings()
     )
     if args.watch:
         return _watched(where, args)

@@ -22,11 +22,11 @@ import webbrowser
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
-from evplace.cli._matcher import of_map, settings_of_matcher
+from evplace.cli._matcher import MatcherFlags
 from evplace.cli._output import note, note_guesses
-from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
+from evplace.cli._settings import Pairs, Part
 from evplace.core import families
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
@@ -46,11 +46,11 @@ def _source_part(args: Any) -> tuple[str, type[Any], dict[str, Any]]:
 
 
 @dataclass(frozen=True)
-class Args(SettingsFlags):
+class Args(MatcherFlags):
     """Flags of `evplace serve`."""
 
     PARTS: ClassVar[tuple[Part, ...]] = (
-        Part.of("matchers", "matcher", preset="preset", usual=of_map),
+        *MatcherFlags.PARTS,
         Part("source_set", "", "source", _source_part),
     )
 
@@ -61,17 +61,6 @@ class Args(SettingsFlags):
     `evplace list live`."""
     source_set: Pairs = ()
     """A setting of the source, as name=value: speed=2, loops=0, layout=spif, format=evt3 ..."""
-    matcher: Annotated[str | None, a_part_of("matchers")] = None
-    """How score rows become answers; `evplace list matchers` says what each does. Default: as the map
-    remembers."""
-    preset: Annotated[str | None, a_preset_of("matchers")] = None
-    """A preset of the matcher."""
-    false_accept: float | None = None
-    """For bayes: the share of the images of places never seen that may be accepted. (0.01)"""
-    lag_s: float | None = None
-    """For bayes: seconds that an answer waits for what comes next; it is better then. (0)"""
-    set: Pairs = ()
-    """A setting of the matcher, as name=value."""
     mask: Path | None = None
     """Pixels of this camera to leave out: a text file of x,y lines, or a .npy file."""
     size: tuple[int, int] | None = None
@@ -120,7 +109,7 @@ def run(args: Args) -> int:
 def opened(args: Args) -> Iterator[Service]:
     """The service that the flags ask for, and its outputs; they end with the block."""
     place_map = PlaceMap.load(args.map)
-    where = Localizer(place_map, args.matcher, args.preset, args.mask, **settings_of_matcher(args))
+    where = Localizer(place_map, args.matcher, args.preset, args.mask, **args.matcher_settings())
     if place_map.recipe is not None and place_map.recipe.cleaning.mask_hot and args.mask is None:
         note("the map was learned without hot pixels: give those of this camera by --mask")
     size = args.size or (None if place_map.recipe is None else place_map.recipe.size)
