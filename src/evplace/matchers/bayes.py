@@ -90,7 +90,7 @@ class Bayes:
         right = probability(of_drive(trace.signs, trace.weight, late=True))
         return Path(trace.item, right, right > self._threshold(route, LATE))
 
-    def start(self, distances: bool = False) -> Matching:  # noqa: ARG002
+    def start(self, distances: bool = False) -> Matching:  # noqa: ARG002 - a distance is -d
         """On rows alone: items a step apart, one query a step."""
         return _OnRows(self)
 

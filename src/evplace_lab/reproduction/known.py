@@ -8,6 +8,7 @@ two cores, all else ten minutes of one.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.errors import SettingsError
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.matchers import _traces as traces
@@ -76,8 +78,10 @@ class Drive:
 def document(
     out: Path, choice: Choice, workers: int, progress: Callable[[int, int, str], None] | None
 ) -> dict[str, Any]:
-    """Make the drives that are missing, fit, and judge; the choice changes nothing."""
-    del choice
+    """Make the drives that are missing, fit, and judge; SettingsError for settings of a training."""
+    if choice.train:
+        raise SettingsError(f"nothing is trained for 'known': leave out {', '.join(choice.train)}")
+    began = time.process_time()
     said = progress or (lambda *_: None)
     drives: list[Drive] = []
     for number, town in enumerate(TOWNS):
@@ -88,7 +92,13 @@ def document(
             drives += _drives(folder, town, sensor)
     weights = {kind: _fitted(drives, kind).tolist() for kind in ("live", "late")}
     rows = [row for town in TOWNS for row in _judged(drives, town.seed)]
-    return {"format": FORMAT, "title": TITLE, "weights": weights, "rows": rows, "cpu_s": 0.0}
+    return {
+        "format": FORMAT,
+        "title": TITLE,
+        "weights": weights,
+        "rows": rows,
+        "cpu_s": round(time.process_time() - began, 1),
+    }
 
 
 def tables(document: dict[str, Any]) -> Iterator[Table]:
