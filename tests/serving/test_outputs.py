@@ -160,13 +160,13 @@ def test_diagnostics_are_what_ros_reads() -> None:
 def test_topics_arrive_over_zenoh(city: PlaceMap) -> None:
     zenoh = pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed")
     from evplace.serving.ros import Topics
-    from evplace.sources.live.zenoh import session
+    from evplace.sources.live.zenoh import leave, session
 
     with socket.socket() as any_one:
         any_one.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{any_one.getsockname()[1]}"
     robot = session("", "peer", endpoint)
-    heard = robot.declare_subscriber("0/**", zenoh.handlers.FifoChannel(100))
+    heard = robot.declare_subscriber("0/**", zenoh.handlers.RingChannel(100))
     topics = Topics("/car/", city, endpoint, "peer")
     found: dict[str, bytes] = {}
     while len(found) < 3:
@@ -182,7 +182,7 @@ def test_topics_arrive_over_zenoh(city: PlaceMap) -> None:
     data = next(data for key, data in found.items() if "NavSatFix" in key)
     assert read_back("sensor_msgs/msg/NavSatFix", data).latitude == fix_of(AT, city).latitude
     topics.close()
-    robot.close()
+    leave(robot)
 
 
 def test_frames_and_codes(city: PlaceMap, image_map: PlaceMap) -> None:

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from evplace.localizer import Match
 from evplace.placemap import PlaceMap
 from evplace.serving._report import SURE, Report, epsg
-from evplace.sources.live.zenoh import GID, attachment, session
+from evplace.sources.live.zenoh import GID, attachment, leave, session
 
 UNKNOWN_M = 1000.0
 """Uncertainty that stands for one that is not known."""
@@ -211,7 +211,7 @@ class Topics:
 
     def close(self) -> None:
         """Leave."""
-        self._session.close()
+        leave(self._session)
 
     def _put(self, publisher: Any, data: bytes, stamp_ns: int) -> None:
         publisher.put(data, attachment=attachment(next(self._numbers), stamp_ns, self._publisher))

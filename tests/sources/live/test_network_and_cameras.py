@@ -21,7 +21,7 @@ from evplace.core.errors import MissingExtraError, RecordingError
 from evplace.core.events import Events
 from evplace.serving.ros import Cdr
 from evplace.sources.live import ANEW, Facts, Item, Live, open_live
-from evplace.sources.live.zenoh import GID, Subscribed, attachment, session
+from evplace.sources.live.zenoh import GID, Subscribed, attachment, leave, session
 from evplace.sources.readers import Block
 from evplace.sources.writers.evt3 import write as write_evt3
 
@@ -178,7 +178,7 @@ def network() -> Iterator[tuple[Live, Callable[[bytes, bytes], None]]]:
 
     yield live, publish
     live.close()
-    camera.close()
+    leave(camera)
 
 
 @needs_zenoh
@@ -232,6 +232,16 @@ def test_a_publisher_that_is_started_again_begins_anew(drive: Events, network: A
 def test_no_router_is_one_line() -> None:
     with pytest.raises(RecordingError, match=r"no zenoh router at tcp/127\.0\.0\.1"):
         open_live("zenoh:events", router=f"tcp/127.0.0.1:{free_port()}")
+
+
+def test_a_peer_that_does_not_answer_is_left_all_the_same() -> None:
+    zenoh = pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed: pip install 'evplace[live]'")
+
+    class Deaf:
+        def close(self) -> None:
+            raise zenoh.ZError("close operation timed out!")
+
+    leave(Deaf())
 
 
 def test_the_attachment_is_that_of_rmw_zenoh() -> None:

@@ -69,7 +69,7 @@ class Subscribed:
         """End the listening."""
         self._closed.set()
         if not self._begun:
-            self._session.close()
+            leave(self._session)
 
     def blocks(self) -> Iterator[Item]:
         """The events of the messages; one that cannot be decoded is counted as lost."""
@@ -87,7 +87,7 @@ class Subscribed:
                     self._publisher, self._decode = publisher, Packets(aligned=True)
                 yield self._events(data)
         finally:
-            self._session.close()
+            leave(self._session)
 
     def _events(self, data: bytes) -> Item:
         try:
@@ -138,6 +138,14 @@ def session(router: str, mode: str, listen: str = "") -> Any:
             f"no zenoh router at {router or 'tcp/localhost:7447'}: start one (ros2 run rmw_zenoh_cpp "
             f"rmw_zenohd), or give the setting 'router' ({error})"
         ) from error
+
+
+def leave(session: Any) -> None:
+    """Close a session; nobody waits for a peer that does not answer the farewell in time."""
+    import zenoh
+
+    with contextlib.suppress(zenoh.ZError):
+        session.close()
 
 
 def attachment(sequence: int, stamp_ns: int, publisher: bytes) -> bytes:
