@@ -10,14 +10,15 @@ kind of failure stands above, and how many of these lie near a border of the map
 from __future__ import annotations
 
 import argparse
+import itertools
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from best import truth_of
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 
+from best import truth_of
 from evplace import Localizer, PlaceGrid, Traverse, evaluate, train
 from evplace.evaluation import Result
 from evplace.imaging.activity import activity
@@ -52,7 +53,7 @@ def kinds_of(result: Result) -> NDArray[np.int64]:
 def failures(kinds: NDArray[np.int64]) -> list[Failure]:
     """The longest first."""
     edges = np.flatnonzero(np.diff(kinds, prepend=-2, append=-2))
-    runs = [Failure(int(kinds[a]), int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    runs = [Failure(int(kinds[a]), int(a), int(b)) for a, b in itertools.pairwise(edges)]
     return sorted((run for run in runs if run.kind >= 0), key=lambda run: run.first - run.end)
 
 
@@ -62,12 +63,14 @@ def summary(result: Result, shown: NDArray[np.float64]) -> list[str]:
     borders = np.flatnonzero(np.diff(result.seen))
     near = np.array([bool((np.abs(borders - query) <= NEAR).any()) for query in queries])
     still = shown < 0.5 * np.nanmedian(shown)
-    return [
-        f"{name:32} {np.sum(kinds == kind):5} of {len(kinds)}: near a border {np.sum(near & (kinds == kind))}, "
-        f"standing {np.sum(still & (kinds == kind))}, "
-        f"first {NEAR} {np.sum((queries < NEAR) & (kinds == kind))}"
-        for kind, name in enumerate(KINDS)
-    ]
+    lines = []
+    for kind, name in enumerate(KINDS):
+        here = kinds == kind
+        lines.append(
+            f"{name:32} {here.sum():5} of {len(kinds)}: near a border {np.sum(near & here)}, "
+            f"standing {np.sum(still & here)}, first {NEAR} {np.sum((queries < NEAR) & here)}"
+        )
+    return lines
 
 
 def line(failure: Failure, result: Result, apart_m: float) -> str:
