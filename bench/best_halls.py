@@ -14,9 +14,10 @@ import argparse
 
 import numpy as np
 
-from evplace import Localizer, PlaceRuns, Traverse, evaluate, train
+from evplace import Localizer, PlaceMap, PlaceRuns, Traverse, evaluate, train
 from evplace.evaluation.truth import Truth, by_matrix
 from evplace.imaging.images import Imager, ImageSettings
+from evplace.localizer import Answers
 from evplace.sources.simulators.esim import PRESETS, Simulator
 from evplace_lab.city.camera import ColourCamera, grey
 from evplace_lab.descriptor.cameras import Camera, Carrying
@@ -59,6 +60,20 @@ def truth_of(query: np.ndarray, reference: np.ndarray) -> Truth:
     return by_matrix(apart <= WITHIN, len(query), len(reference), "queries")
 
 
+def figures(place_map: PlaceMap, query: Traverse, truth: Truth) -> list[float]:
+    """Right in %: single images, live, in hindsight."""
+    always = Localizer(place_map, "bayes", threshold=-1.0)
+    asked: list[tuple[Localizer, Answers]] = [
+        (Localizer(place_map, "best"), "live"),
+        (always, "live"),
+        (always, "hindsight"),
+    ]
+    return [
+        100 * evaluate(where, query, truth, answers=answers).figures["accuracy_seen"]
+        for where, answers in asked
+    ]
+
+
 def main() -> None:
     """Print a line for each hall and scorer, and the means."""
     flags = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -74,17 +89,10 @@ def main() -> None:
             kept = place_map.items.t_us
             assert kept is not None
             truth = truth_of(where, at[np.searchsorted(reference.t_us, kept)])
-            shown = [
-                100 * evaluate(Localizer(place_map, matcher, **more), query, truth, answers=answers).figures["accuracy_seen"]
-                for matcher, answers, more in (
-                    ("best", "live", {}), ("bayes", "live", {"threshold": -1.0}), ("bayes", "hindsight", {"threshold": -1.0}),
-                )
-            ]  # fmt: skip
+            shown = figures(place_map, query, truth)
             found.setdefault(scorer, []).append(shown)
-            print(
-                f"{seed} ({hall.length_m:.0f} m), {scorer}: " + " ".join(f"{one:.1f}" for one in shown),
-                flush=True,
-            )
+            words = " ".join(f"{one:.1f}" for one in shown)
+            print(f"{seed} ({hall.length_m:.0f} m), {scorer}: {words}", flush=True)
     for scorer, rows in found.items():
         means, spread = np.mean(rows, axis=0), np.std(rows, axis=0)
         print(f"mean, {scorer}: " + ", ".join(f"{a:.1f}±{b:.1f}" for a, b in zip(means, spread, strict=True)))
