@@ -16,4 +16,8 @@ LATE = np.array([
     1.2105, -0.8435, 0.3647, -0.0897, 0.4042,
 ])
 """Where what comes later is known, too."""
+ELSEWHERE = np.array([
+    0.9314, 0.9004, 0.8526, 0.7803, 0.6781, 0.4783, 0.3109, 0.1770, 0.0442,
+])
+"""Above these, LATE accepts SHARES of the images of places that the maps of those towns lack."""
 # fmt: on
