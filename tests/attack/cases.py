@@ -98,9 +98,11 @@ def _refused(error: EvplaceError) -> bool:
 
 
 def damaged(data: bytes, kind: str, seed: int, number: int) -> bytes:
-    """A recording with one bit flipped, or cut off, another for each number."""
+    """A recording with one bit flipped, with two to four in every second case, or cut off."""
     if kind == "flip":
-        return flipped(data, seed, number)
+        for more in range(1 if number // 2 % 2 == 0 else 2 + number // 4 % 3):
+            data = flipped(data, seed + more, number)
+        return data
     return data[: random.Random(f"{seed} {number}").randrange(len(data))]
 
 
