@@ -49,13 +49,7 @@ def main(kind: str, name: str, seed: int, first: int, count: int, board: Path) -
     """Do the cases from `first` to `count`; returns how many ended in an exception that nobody meant."""
     answered = refused = foreign = 0
     with tempfile.TemporaryDirectory(dir=_memory()) as folder, board.open("r+b", buffering=0) as written:
-        case: Case = {
-            "flip": _recording,
-            "cut": _recording,
-            "log": _log,
-            "folder": _folder,
-            "settings": _settings,
-        }[kind](Path(folder), kind, name, seed)
+        case = cases(Path(folder), kind, name, seed)
         for number in range(first, count):
             written.seek(0)
             written.write(BOARD.pack(number, answered, refused, foreign))
@@ -72,6 +66,12 @@ def main(kind: str, name: str, seed: int, first: int, count: int, board: Path) -
         written.write(BOARD.pack(count, answered, refused, foreign))
     print(_megabytes())
     return foreign
+
+
+def cases(folder: Path, kind: str, name: str, seed: int) -> Case:
+    """What does the cases of a kind, with files in `folder`."""
+    makers = {"flip": _recording, "cut": _recording, "log": _log, "folder": _folder, "settings": _settings}
+    return makers[kind](folder, kind, name, seed)
 
 
 def _megabytes() -> int:

@@ -26,7 +26,7 @@ from functools import partial
 from pathlib import Path
 
 from cases import BOARD, ISOLATED, damaged, whole
-from outputs import full_disks, hostile_files, kills
+from outputs import Outcome, full_disks, hostile_files, kills, prepared
 
 from evplace.core.errors import EvplaceError
 from evplace.sources.readers import open_recording
@@ -172,16 +172,23 @@ def parts(share: float, seed: int, only: str) -> dict[str, Callable[[], Counts]]
         kinds[f"logs as {name}"] = partial(many, "log", name, some(LOGS, len(logs)), seed)
     for name in commands:
         kinds[f"settings of {name}"] = partial(many, "settings", name, some(SETTINGS, len(commands)), seed)
-    kinds["kills"] = lambda: _counted(kills(some(KILLS), seed))
-    kinds["full disks"] = lambda: _counted(full_disks(share < 0.1))
-    kinds["hostile files"] = lambda: _counted(hostile_files())
+    disks_kb = (16,) if share < 0.1 else (4, 16, 64, 256)
+    kinds["kills"] = lambda: counted(_prepared(kills, some(KILLS), seed))
+    kinds["full disks"] = lambda: counted(_prepared(full_disks, disks_kb))
+    kinds["hostile files"] = lambda: counted(hostile_files())
     for form in sorted(MAKERS):
         kinds[f"cuts of {form}"] = partial(many, "cut", form, some(CUTS), seed)
         kinds[f"flips of {form}"] = partial(many, "flip", form, some(FLIPS), seed)
     return {kind: attack for kind, attack in kinds.items() if kind.startswith(tuple(only.split(",")))}
 
 
-def _counted(outcomes: Iterator[tuple[str, str, int]]) -> Counts:
+def _prepared(attack: Callable[..., Iterator[Outcome]], *arguments: object) -> Iterator[Outcome]:
+    """An attack in a folder of its own."""
+    with tempfile.TemporaryDirectory() as name:
+        yield from attack(prepared(Path(name)), *arguments)
+
+
+def counted(outcomes: Iterator[Outcome]) -> Counts:
     """The sum of outcomes: what was done, what was found wrong (empty for nothing), and megabytes used."""
     counts = Counts()
     for what, wrong, megabytes in outcomes:
