@@ -13,8 +13,8 @@ from evplace.sources._times import DAY_US
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Keep = Literal["before", "after"]
-"""Which side is right where a log's clock was set, or its positions leapt for good."""
+Keep = Literal["before", "after", "both"]
+"""Which side is right where a log's clock was set, or its positions leapt for good; of a clock also both."""
 
 _SHOWN = 90
 """Characters of a line that are shown as an example."""
