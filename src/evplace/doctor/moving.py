@@ -40,7 +40,9 @@ class Check(AtTheEnd):
         known = np.isfinite(activity) & np.isfinite(mps)
         moves = known & (mps > MOVING_MPS)
         if moves.sum() * BIN_US < FEWEST_S * 1e6:
-            sentence = f"Cannot be determined: track and recording share less than {FEWEST_S:g} s of movement."
+            sentence = (
+                f"Cannot be determined: track and recording share less than {FEWEST_S:g} s of movement."
+            )
             return Outcome([Finding("movement", "unknown", None, "%", sentence)])
         usual, busy = np.median(activity[moves]), np.percentile(activity[known], 90)
         unseen = _long(moves & (activity <= LOW * busy))

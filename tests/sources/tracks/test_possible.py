@@ -228,6 +228,14 @@ def test_a_drift_of_the_whole_log_is_told(tmp_path: Path) -> None:
     assert any("keep drifting away" in note and "not checked" in note for note in track.notes)
 
 
+def test_a_track_says_what_it_was_held_against(tmp_path: Path) -> None:
+    assert open_track(written(tmp_path, rmc_log(Log()))).held_against == "speed and course"
+    assert open_track(written(tmp_path, csv_log(Log()))).held_against == ""
+    rows = csv_log(Log()).splitlines()
+    with_speed = "\n".join([f"{rows[0]},speed", *(f"{row},10" for row in rows[1:])])
+    assert open_track(written(tmp_path, with_speed)).held_against == "speed"
+
+
 @pytest.mark.parametrize("longitude", [147.1, 152.9])
 def test_courses_are_those_of_the_true_north(tmp_path: Path, longitude: float) -> None:
     """At the edges of a zone its north lies up to 3 degrees off: no drift of the positions."""

@@ -99,6 +99,8 @@ class Fixes:
     """Whether times count from 1970, not from the midnight before the first fix."""
     unit: str | None = None
     """The unit that the times were taken in, where the file does not say."""
+    held_against: str = ""
+    """What of the log's own its positions were held against as they go on, so that a drift shows."""
     losses: Losses = field(default_factory=Losses)
     """What the reader left out."""
     notes: list[str] = field(default_factory=list)
