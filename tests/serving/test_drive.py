@@ -6,7 +6,6 @@ import dataclasses
 import io
 import json
 import os
-import socket
 import threading
 import time
 from collections.abc import Callable
@@ -26,9 +25,7 @@ from evplace.serving._feed import Feed
 from evplace.serving._report import Describer, Report
 from evplace.sources.live import ANEW, Live, open_live
 from evplace.sources.live.stdin import Piped
-from evplace.sources.live.udp import Listening
 from evplace.sources.writers import write_recording
-from made_streams import faery_datagrams
 
 SIZE = (80, 60)
 
@@ -108,20 +105,6 @@ def test_live_is_offline(
 ) -> None:
     driven = Driven(image_map, opened(night_drive.events, tmp_path), matcher)
     same(driven.end(), offline(image_map, night_drive.events, matcher))
-
-
-def test_udp_is_offline(image_map: PlaceMap, night_drive: Drive) -> None:
-    live = open_live("udp:0", SIZE)
-    assert isinstance(live, Listening)
-    driven = Driven(image_map, live)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        for data in faery_datagrams(night_drive.events):
-            sender.sendto(data, ("127.0.0.1", live.port))
-    wanted = offline(image_map, night_drive.events)
-    driven.until(lambda: len(driven.reports) >= len(wanted))
-    same(driven.matches[: len(wanted)], wanted)
-    assert driven.feed.counters().events == len(night_drive.events)
-    driven.drive.close(1.0)
 
 
 def test_silence_is_said_and_what_comes_after_it_is_found(image_map: PlaceMap, night_drive: Drive) -> None:

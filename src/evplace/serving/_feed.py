@@ -69,6 +69,8 @@ class Feed:
         """Whether nothing more comes, though some may still be held."""
         self.last_s = time.monotonic()
         """When the last events came."""
+        self.quiet_s = self.last_s
+        """Until when the source has said that nothing came: a busy machine is not a silent camera."""
         self._sieve, self._recorder, self._hold = Sieve(size), recorder, hold
         self._counters = Counters()
         self._waits = Facts.of(source).waits
@@ -141,6 +143,7 @@ class Feed:
 
     def _push(self, item: object) -> None:
         if item is None:
+            self.quiet_s = time.monotonic()
             self._put(self._sieve.flush().blocks)
         elif isinstance(item, Block):
             self.last_s = time.monotonic()
