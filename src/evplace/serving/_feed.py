@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from evplace.core.errors import EvplaceError
+from evplace.core.errors import EvplaceError, RecordingError
 from evplace.core.events import Events, Size
 from evplace.serving._clock import Sieve
 from evplace.serving._recorder import Recorder
@@ -147,6 +147,7 @@ class Feed:
             self._put(self._sieve.flush().blocks)
         elif isinstance(item, Block):
             self.last_s = time.monotonic()
+            check_size(self.size, getattr(self.source, "size", None))
             found = self._sieve.push(item, self.last_s, self.pace)
             self._anew = self._anew or found.anew
             self._put(found.blocks)
@@ -187,4 +188,13 @@ class Feed:
     def _is_full(self, packet: Packet) -> bool:
         return bool(self._packets) and (
             self._counters.backlog + len(packet.events) > self._hold or len(self._packets) >= PACKETS
+        )
+
+
+def check_size(wanted: Size | None, given: Size | None) -> None:
+    """RecordingError where a map and a source have two sensors; a stream may say its own only as it comes."""
+    if wanted is not None and given is not None and tuple(wanted) != tuple(given):
+        raise RecordingError(
+            f"the map was made with a sensor of {wanted[0]}x{wanted[1]} pixels, this source has "
+            f"{given[0]}x{given[1]}: give the map's own sensor, or train a map with this one"
         )
