@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made import MAKERS
+from made import MAKERS, encoded, libcaer_words, mono_words, ros1_bag
 from numpy.typing import NDArray
 
 from evplace.core import families
@@ -18,11 +19,12 @@ from evplace.core.errors import EvplaceError
 from evplace.core.events import Events, Size
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.stream import EventImages
-from evplace.sources.readers import Recording, Source
+from evplace.sources.readers import Hints, Recording, Source, _source
+from evplace.sources.readers._ros import PACKED
 from evplace.testing._readers import cut_at, flipped
 
 SIZE: Size = (240, 180)
-MARKING = ["evt3"]
+MARKING = ["aedat4", "dat", "es", "evt2", "evt21", "evt3", "ros1", "ros2_db3", "ros2_mcap"]
 """The formats whose readers mark."""
 DAMAGES = 25
 """Cuts and flips of each file."""
@@ -44,14 +46,8 @@ def drive(count: int, seed: int = 0) -> Events:
 def opened(form: str, path: Path) -> Recording:
     """Of a known format and size, whatever a flipped bit has made of the header."""
     module = families.load("readers", form)
-    source: Source = module.read(path, module_hints())
+    source: Source = module.read(path, Hints(SIZE))
     return Recording(path, form, source, SIZE)
-
-
-def module_hints() -> Any:
-    from evplace.sources.readers import Hints
-
-    return Hints(SIZE)
 
 
 def told(recording: Recording, stream: EventImages, marking: bool) -> list[Any]:
@@ -116,9 +112,44 @@ def test_damage_changes_nothing(form: str, tmp_path: Path, monkeypatch: pytest.M
             same(form, bad, Recipe().changed(dt="1/120"), masked() if number % 2 else None)
 
 
+def arrays(events: Events) -> bytes:
+    """A serialised dvs_msgs/EventArray of ROS 1."""
+    head = struct.pack("<IIII3sII", 0, 7, 0, 3, b"cam", 180, 240)
+    rows = np.zeros(len(events), PACKED)
+    rows["x"], rows["y"], rows["p"] = events.x, events.y, events.p
+    rows["s"], rows["ns"] = events.t_us // 1_000_000, events.t_us % 1_000_000 * 1000
+    return head + struct.pack("<I", len(rows)) + rows.tobytes()
+
+
+def messages(events: Events, kind: str) -> list[bytes]:
+    """In messages of 700 events; "mixed" has an encoding that stores among one that marks."""
+    if kind == "arrays":
+        return [arrays(events[start : start + 700]) for start in range(0, len(events), 700)]
+    found = []
+    for number, start in enumerate(range(0, len(events), 700)):
+        part = events[start : start + 700]
+        stores = kind == "mixed" and number % 3 == 1
+        made = libcaer_words(part) if stores else mono_words(part)
+        found.append(encoded("libcaer" if stores else "mono", 7_000_000_000 * stores, made.tobytes()))
+    return found
+
+
+@pytest.mark.parametrize("kind", ["arrays", "mono", "mixed"])
+def test_messages_of_each_encoding(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_source, "GATHERED", 900)
+    name = "dvs_msgs/EventArray" if kind == "arrays" else "event_camera_msgs/EventPacket"
+    path, bad = ros1_bag(tmp_path, name, messages(drive(15_000), kind)), tmp_path / "bad.bag"
+    assert len(same("ros1", path, Recipe().changed(dt="1/120"))) > 30
+    data = path.read_bytes()
+    for number in range(DAMAGES):
+        bad.write_bytes(flipped(data, 2, number))
+        same("ros1", bad, Recipe().changed(dt="1/120"), masked() if number % 2 else None)
+
+
 def words(monkeypatch: pytest.MonkeyPatch, form: str, count: int) -> None:
-    """Have a reader decode so many words at a time, where it decodes words."""
+    """Have a reader decode so many words at a time."""
     module = families.load("readers", form)
+    monkeypatch.setattr(_source, "GATHERED", count)
     for name in ("WORDS", "EVENTS", "BYTES"):
         if hasattr(module, name):
             monkeypatch.setattr(module, name, count)

@@ -107,18 +107,20 @@ def printable(name: str, most: int = SHOWN) -> str:
     return shown if len(shown) <= most else f"{shown[:most]}..."
 
 
-def gathered(blocks: Iterator[Block], events: int = 1 << 15) -> Iterator[Block]:
-    """Small blocks joined into blocks of at least `events` events; what is held comes out before a fault.
+GATHERED = 1 << 15
+"""Events up to which small blocks are joined: larger ones would not stay in the processor's cache until they
+are checked."""
 
-    Much larger ones would not stay in the processor's cache until they are checked.
-    """
+
+def gathered(blocks: Iterator[Block]) -> Iterator[Block]:
+    """Small blocks joined into blocks of at least GATHERED events; what is held comes out before a fault."""
     held: list[Block] = []
     count = 0
     try:
         for block in blocks:
             held.append(block)
             count += len(block.t_us) + block.marked
-            if count >= events:
+            if count >= GATHERED:
                 yield joined(held)
                 held, count = [], 0
     except Exception:

@@ -49,7 +49,8 @@ class Decoder:
     """Remembers row, column and time from one run of words to the next."""
 
     def __init__(self, shift_us: int = 0) -> None:
-        self._shift_us = shift_us
+        self.shift_us = shift_us
+        """Added to all times."""
         self._state = np.zeros(4, np.int64)  # time (us), row, base column, polarity
         self._clock = clock()
         self._timed = False
@@ -68,7 +69,7 @@ class Decoder:
 
     def _decoded(self, run: NDArray[np.uint16], canvas: Canvas | None) -> Block:
         sink = sink_of(canvas, MOST * len(run))
-        _decode(run, self._state, self._clock, self._shift_us, sink)
+        _decode(run, self._state, self._clock, self.shift_us, sink)
         return sink.block()
 
 
