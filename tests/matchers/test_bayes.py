@@ -104,8 +104,7 @@ def test_a_move_is_that_of_a_plain_matrix(seconds: float) -> None:
     rng = np.random.default_rng(0)
     before = rng.random((30, len(belief.SPEEDS)))
     before /= before.sum()
-    work = np.empty_like(before), np.empty_like(before)
-    found = belief.moved(before.copy(), ways, seconds, work)
+    found = belief.moved(before.copy(), ways, seconds, np.empty_like(before))
     matrix = plain_transition(ways, seconds)
     np.testing.assert_allclose(found.reshape(-1), matrix @ before.reshape(-1), atol=1e-12)
 
@@ -137,9 +136,7 @@ def test_hindsight_is_forward_and_backward_by_plain_matrices() -> None:
 
 
 def evidence(filter_: belief.Filter, row: NDArray[np.float32]) -> Floats:
-    from evplace.matchers._surroundings import looked_up
-
-    return looked_up(filter_.says, traces.robust_z(row))
+    return filter_.says[cells(traces.robust_z(row))]
 
 
 def test_a_transposed_move_undoes_no_product() -> None:

@@ -159,7 +159,7 @@ def _read(content: Content, name: str, items: int) -> Compressed:
         good = isinstance(array, np.ndarray) and array.dtype == np.float32 and array.ndim == 2
         if not good or not np.isfinite(np.asarray(array)).all():
             raise PlaceMapError(f"the map's vectors of '{name}' are missing or damaged: train it again")
-    basis, vectors = np.asarray(basis), np.asarray(vectors)
+    basis, vectors = np.array(basis), np.array(vectors)  # in memory: every image reads all of them
     if len(vectors) != items or basis.shape[1] != vectors.shape[1]:
         raise PlaceMapError(
             f"the map holds vectors of '{name}' of shape {vectors.shape} by {basis.shape} for {items} items"
