@@ -14,6 +14,7 @@ from evplace.matchers import _belief as belief
 from evplace.matchers import _route_filter as loops
 from evplace.matchers import _traces as traces
 from evplace.matchers._calibration import LATE, LIVE
+from evplace.matchers._surroundings import cells
 from evplace.matchers._ways import Ways
 from evplace.matchers.bayes import Bayes
 from evplace.testing import check_matcher

@@ -167,19 +167,22 @@ def read(belief: Floats, z: NDArray[np.float32], way: Floats, xy: Floats, reach:
         if abs(way[r] - centre) < abs(way[item] - centre):
             item = r
     out[0] = most
-    out[1], out[2], top = -1e9, -1e9, 0
+    beside, elsewhere, top = -1e9, -1e9, 0
     for r in range(n):
         if z[r] > z[top]:
             top = r
-        along, east, north = abs(way[r] - way[item]), xy[r, 0] - xy[item, 0], xy[r, 1] - xy[item, 1]
-        apart = min(along, np.sqrt(east * east + north * north))
-        if along < reach[1] and z[r] > out[1]:
-            out[1] = z[r]
-        if apart > reach[3] and z[r] > out[2]:
-            out[2] = z[r]
-    east, north = xy[top, 0] - xy[item, 0], xy[top, 1] - xy[item, 1]
-    agrees = min(abs(way[top] - way[item]), np.sqrt(east * east + north * north)) < reach[2]
-    out[3] = 1.0 if agrees else 0.0
-    if out[2] < -1e8:  # the whole map is one place
-        out[2] = -4.0
+        if z[r] > beside and abs(way[r] - way[item]) < reach[1]:
+            beside = z[r]
+        if z[r] > elsewhere and _apart(way, xy, r, item) > reach[3]:
+            elsewhere = z[r]
+    out[1] = beside
+    out[2] = elsewhere if elsewhere >= -1e8 else -4.0  # the whole map is one place
+    out[3] = 1.0 if _apart(way, xy, top, item) < reach[2] else 0.0
     return item
+
+
+@njit(cache=True, nogil=True)
+def _apart(way: Floats, xy: Floats, one: int, other: int) -> float:
+    """Metres between two references, along the way or as the crow flies: whichever is shorter."""
+    east, north = xy[one, 0] - xy[other, 0], xy[one, 1] - xy[other, 1]
+    return float(min(abs(way[one] - way[other]), np.sqrt(east * east + north * north)))

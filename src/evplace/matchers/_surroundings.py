@@ -57,4 +57,4 @@ def evidence(wrong: Floats) -> Floats:
 def cells(z: NDArray[np.float32]) -> NDArray[np.int32]:
     """(items,) where in GRID z-scores are: the nearest one."""
     at = np.clip((z - np.float32(GRID[0])) * np.float32(1 / STEP) + np.float32(0.5), 0, len(GRID) - 1)
-    return at.astype(np.int32)
+    return np.asarray(at, np.int32)
