@@ -29,6 +29,7 @@ from evplace.scorers import (
     Learning,
     OpenScorer,
     Rows,
+    in_blocks,
     references_of,
     usable,
 )
@@ -44,8 +45,6 @@ STANDING = 0.5
 """Without positions, images that show less than this share of the usual are left out: the camera stood."""
 FAR_APART_US = 500_000
 """Images so far apart do not tell whether the camera stood between them."""
-BLOCK = 64
-"""Images described at once."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ class Fused:
         content: dict[str, NDArray[np.float32] | NDArray[np.uint8] | bytes] = {REFERENCES: references}
         for name, part in self.parts.items():
             many = self.components if name == "edges" else self.components // 2
-            found = compress(_described(part, references), many)
+            found = compress(in_blocks(part.describe, references), many)
             content |= {f"{name}_basis": found.basis, f"{name}_vectors": found.vectors}
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
@@ -124,11 +123,6 @@ def _kept(reference: Traverse, places: Places, every_m: float) -> NDArray[np.int
         return np.flatnonzero(used)
     shown = activity(reference.images, of_events=bool((reference.counts >= 0).any()))
     return np.flatnonzero(used & ~(shown < STANDING * np.nanmedian(shown[used])))
-
-
-def _described(part: Descriptor, images: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """(n, dimensions), a block of images at a time."""
-    return np.concatenate([part.describe(images[at : at + BLOCK]) for at in range(0, len(images), BLOCK)])
 
 
 def _versions(settings: Fused) -> dict[str, str]:
