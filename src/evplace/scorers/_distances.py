@@ -93,7 +93,7 @@ def _difference(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> int:
     total = np.int32(0)
     for k in range(one.shape[0]):
         total = np.int32(total + np.int32(abs(np.int32(np.int32(one[k]) - np.int32(other[k])))))
-    return total
+    return int(total)
 
 
 def _as_pixels(queries: Images, references: Images) -> tuple[Images, Images]:
