@@ -16,6 +16,7 @@ from evplace.matchers import _traces as traces
 from evplace.matchers._calibration import LATE, LIVE
 from evplace.matchers._known import threshold
 from evplace.matchers._known_weights import ELSEWHERE
+from evplace.matchers._surroundings import cells
 from evplace.matchers._ways import Ways
 from evplace.matchers.bayes import Bayes
 from evplace.testing import check_matcher
@@ -106,8 +107,7 @@ def test_a_move_is_that_of_a_plain_matrix(seconds: float) -> None:
     rng = np.random.default_rng(0)
     before = rng.random((30, len(belief.SPEEDS)))
     before /= before.sum()
-    work = np.empty_like(before), np.empty_like(before)
-    found = belief.moved(before.copy(), ways, seconds, work)
+    found = belief.moved(before.copy(), ways, seconds, np.empty_like(before))
     matrix = plain_transition(ways, seconds)
     np.testing.assert_allclose(found.reshape(-1), matrix @ before.reshape(-1), atol=1e-12)
 
@@ -139,9 +139,7 @@ def test_hindsight_is_forward_and_backward_by_plain_matrices() -> None:
 
 
 def evidence(filter_: belief.Filter, row: NDArray[np.float32]) -> Floats:
-    from evplace.matchers._surroundings import looked_up
-
-    return looked_up(filter_.says, traces.robust_z(row))
+    return filter_.says[cells(traces.robust_z(row))]
 
 
 def test_a_transposed_move_undoes_no_product() -> None:

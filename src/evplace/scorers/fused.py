@@ -29,6 +29,7 @@ from evplace.scorers import (
     Learning,
     OpenScorer,
     Rows,
+    in_blocks,
     references_of,
     usable,
 )
@@ -44,8 +45,6 @@ STANDING = 0.5
 """Without positions, images that show less than this share of the usual are left out: the camera stood."""
 FAR_APART_US = 500_000
 """Images so far apart do not tell whether the camera stood between them."""
-BLOCK = 64
-"""Images described at once."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ class Fused:
         content: dict[str, NDArray[np.float32] | NDArray[np.uint8] | bytes] = {REFERENCES: references}
         for name, part in self.parts.items():
             many = self.components if name == "edges" else self.components // 2
-            found = compress(_described(part, references), many)
+            found = compress(in_blocks(part.describe, references), many)
             content |= {f"{name}_basis": found.basis, f"{name}_vectors": found.vectors}
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
@@ -126,11 +125,6 @@ def _kept(reference: Traverse, places: Places, every_m: float) -> NDArray[np.int
     return np.flatnonzero(used & ~(shown < STANDING * np.nanmedian(shown[used])))
 
 
-def _described(part: Descriptor, images: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """(n, dimensions), a block of images at a time."""
-    return np.concatenate([part.describe(images[at : at + BLOCK]) for at in range(0, len(images), BLOCK)])
-
-
 def _versions(settings: Fused) -> dict[str, str]:
     return {"edges": EDGES_VERSION} | ({"trained": Trained().version} if settings.trained else {})
 
@@ -159,7 +153,7 @@ def _read(content: Content, name: str, items: int) -> Compressed:
         good = isinstance(array, np.ndarray) and array.dtype == np.float32 and array.ndim == 2
         if not good or not np.isfinite(np.asarray(array)).all():
             raise PlaceMapError(f"the map's vectors of '{name}' are missing or damaged: train it again")
-    basis, vectors = np.asarray(basis), np.asarray(vectors)
+    basis, vectors = np.array(basis), np.array(vectors)  # in memory: every image reads all of them
     if len(vectors) != items or basis.shape[1] != vectors.shape[1]:
         raise PlaceMapError(
             f"the map holds vectors of '{name}' of shape {vectors.shape} by {basis.shape} for {items} items"
