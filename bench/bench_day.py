@@ -1,16 +1,19 @@
 """Memory of a live drive of a day, hour by hour, for each matcher: python bench/bench_day.py [--rate 30]
 
-Against 10,000 references. The clock is simulated: a day at 30 Hz is 2.6 million steps, which take an hour or so;
-at a lower rate an hour has fewer of them. What is counted is what Python, numpy and numba have asked for.
+Against 10,000 references, by a simulated clock. A day at 30 Hz is 2.6 million steps, minutes to an hour of work;
+at a lower rate an hour has fewer of them. Memory is all that the process holds (Linux). Without matchers named,
+each runs in a process of its own.
 """
 
 from __future__ import annotations
 
 import argparse
-import gc
 import math
+import os
+import subprocess
+import sys
 import time
-import tracemalloc
+from pathlib import Path
 
 import numpy as np
 
@@ -36,33 +39,40 @@ def rows() -> np.ndarray:
 
 def hour(matching: Following, table: np.ndarray, start: int, rate: float) -> int:
     """Step for an hour; the number of the next query."""
-    steps = math.ceil(3600 * rate)
-    for query in range(start, start + steps):
+    end = start + math.ceil(3600 * rate)
+    for query in range(start, end):
         matching.step(table[query % PLAYED], Seen(int(query * 1e6 / rate), 50.0))
-    return start + steps
+    return end
+
+
+def held_mb() -> float:
+    """What this process holds."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def day(name: str, rate: float) -> None:
+    """Print a line."""
+    began, query, held = time.process_time(), 0, []
+    matching, table = follow(families.make("matchers", name, None, {}), route(), distances=False), rows()
+    for _ in range(HOURS):
+        query = hour(matching, table, query, rate)
+        held.append(held_mb())
+    shown = " ".join(f"{mb:.0f}" for mb in held)
+    took = time.process_time() - began
+    print(f"{name}: {query} steps ({took:.0f} s), last hour / second {held[-1] / held[1]:.3f}; MB: {shown}")
 
 
 def main() -> None:
-    """Print a line for each matcher."""
+    """One matcher after another."""
     flags = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    flags.add_argument("--rate", type=float, default=1.0, help="images a second")
-    flags.add_argument("--matchers", nargs="+", default=families.names("matchers"))
+    flags.add_argument("--rate", type=float, default=5.0, help="images a second")
+    flags.add_argument("--matchers", nargs="+", default=[])
     args = flags.parse_args()
-    table = rows()
     for name in args.matchers:
-        began, query, held = time.process_time(), 0, []
-        gc.collect()
-        tracemalloc.start()
-        matching = follow(families.make("matchers", name, None, {}), route(), distances=False)
-        for _ in range(HOURS):
-            query = hour(matching, table, query, args.rate)
-            held.append(tracemalloc.get_traced_memory()[0] / 1e6)
-        tracemalloc.stop()
-        shown = " ".join(f"{mb:.1f}" for mb in held)
-        print(
-            f"{name}: {query} steps, MB by hour: {shown}; last over second {held[-1] / held[1]:.3f}", end=""
-        )
-        print(f" ({time.process_time() - began:.0f} s)", flush=True)
+        day(name, args.rate)
+    for name in [] if args.matchers else families.names("matchers"):
+        subprocess.run([sys.executable, __file__, "--rate", str(args.rate), "--matchers", name], check=True)
 
 
 if __name__ == "__main__":

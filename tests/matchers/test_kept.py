@@ -55,7 +55,7 @@ def test_a_path_knows_nothing_of_what_is_forgotten(name: str) -> None:
         np.testing.assert_array_equal(path.item[-2:], complete.item[-2:])
 
 
-def test_what_is_given_in_blocks_is_kept_whole(forgetful: None) -> None:  # noqa: ARG001 - a fixture
+def test_what_is_given_in_blocks_is_kept_whole(forgetful: None) -> None:
     for name in MATCHERS:
         matching = open_matcher(name)
         matching.extend(drive())

@@ -1,7 +1,7 @@
 """What is kept of a drive: all of it where it was given in blocks; of a live one, the last stretch.
 
-So `step` needs no more memory after a day than after an hour. No later step needs what it forgets; `path` says
--1 of queries so far back.
+So `step` needs no more memory after a day than after an hour. No later step needs what it forgets; `path`
+says -1 of queries so far back.
 """
 
 from __future__ import annotations
