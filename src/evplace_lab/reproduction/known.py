@@ -3,8 +3,8 @@
 Each town's day is the map; its other drives are localised on the whole map, and on maps that lack every other
 stretch, so that the drive enters and leaves what is known. The figures are of towns that were left out, live
 and in hindsight, at the threshold for 1 % of false accepts: the accuracy on the whole map, and the share of
-false accepts on all. Three ways to find that threshold stand beside one another: by what the map tells of
-itself, by the other towns' drives, and halfway between. The drives take half an hour of two cores, all else
+false accepts on all. Two ways to find that threshold stand beside one another: by what the map tells of
+itself, as `bayes` does, and by the other towns' drives. The drives take half an hour of two cores, all else
 ten minutes of one.
 """
 
@@ -24,7 +24,7 @@ from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.matchers import _traces as traces
 from evplace.matchers._calibration import strangers
-from evplace.matchers._known import SHARES, halfway, of_drive
+from evplace.matchers._known import of_drive
 from evplace.matchers._ways import Ways
 from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
@@ -47,7 +47,7 @@ TOWNS = (
     ),
 )  # fmt: skip
 KINDS = ("live", "late")
-USED = {"live": "the map", "late": "halfway"}
+USED = "the map"
 """Where `bayes` takes its thresholds from."""
 CUT_M = (60.0, 150.0)
 """Shortest and longest stretch that a map lacks, or has."""
@@ -113,12 +113,10 @@ def document(
             own.append(_own(place_map, town.seed, sensor))
             drives += _drives(folder, town, sensor, place_map)
     weights = {kind: _fitted(drives, kind) for kind in KINDS}
-    elsewhere = np.quantile(_unknown(drives, "late", weights["late"]), 1 - SHARES)
     return {
         "format": FORMAT,
         "title": TITLE,
         "weights": {kind: found.tolist() for kind, found in weights.items()},
-        "elsewhere": elsewhere.tolist(),
         "rows": [row for town in TOWNS for row in _judged(drives, own, town.seed)],
         "cpu_s": round(time.process_time() - began, 1),
     }
@@ -130,7 +128,7 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
     columns = ["town", "sensor", "query", "live", "false accepts", "late", "false accepts"]
     lines = [
         [str(row["town"]), row["sensor"], row["query"],
-         *(_shown(row[kind][USED[kind]][name]) for kind in KINDS for name in ("accuracy", "false_accepts"))]
+         *(_shown(row[kind][USED][name]) for kind in KINDS for name in ("accuracy", "false_accepts"))]
         for row in rows
     ]  # fmt: skip
     yield Table(document["title"], columns, lines)
@@ -140,9 +138,9 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
         for way in rows[0][kind]
     ]
     yield Table("Where the threshold comes from", ["answers", "by", "accuracy", "false accepts"], lines)
-    found = document["weights"] | {"elsewhere": document["elsewhere"]}
-    lines = [[name, " ".join(f"{value:.4f}" for value in values)] for name, values in found.items()]
-    yield Table("For evplace/matchers/_known_weights.py", ["name", "values"], lines)
+    weights = document["weights"]
+    lines = [[kind, " ".join(f"{weight:.4f}" for weight in weights[kind])] for kind in weights]
+    yield Table("For evplace/matchers/_known_weights.py", ["answers", "weights"], lines)
 
 
 def _mean(rows: list[dict[str, Any]], kind: str, way: str, name: str) -> float:
@@ -269,7 +267,7 @@ def _thresholds(mine: Own, rest: list[Drive], kind: str, weights: Floats) -> dic
         float(np.quantile(unknown, 1 - ASKED))
         for unknown in (_said(mine.features[kind], weights), _unknown(rest, kind, weights))
     )
-    return {"the map": own, "other towns": elsewhere, "halfway": halfway(own, elsewhere)}
+    return {USED: own, "other towns": elsewhere}
 
 
 def _at(group: list[Drive], kind: str, weights: Floats, limit: float) -> dict[str, float | None]:

@@ -44,11 +44,12 @@ def test_a_town_is_judged_by_the_weights_of_the_others() -> None:
     assert row["live"]["the map"]["false_accepts"] == pytest.approx(1, abs=0.5)
 
 
-def test_halfway_lies_between_the_map_and_other_towns() -> None:
+def test_a_threshold_is_the_maps_own_or_that_of_other_towns() -> None:
     drives = [drive(1, 0, [0.0, 2.0, 0.0]), drive(2, 1, [0.0, 2.0, 0.0])]
     sure = known.Own(1, "ideal", dict.fromkeys(known.KINDS, np.full((200, 2), 3.0)))
     limits = known._thresholds(sure, drives[1:], "late", known._fitted(drives[1:], "late"))
-    assert limits["other towns"] < limits["halfway"] < limits["the map"]
+    said = known._said(np.full((1, 2), 3.0), known._fitted(drives[1:], "late"))
+    assert limits["other towns"] < limits["the map"] == pytest.approx(said[0])
 
 
 def test_settings_of_a_training_mean_nothing(tmp_path: Path) -> None:
