@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from evplace.core.errors import InputError
 from evplace.core.events import Events
 from evplace.imaging.stream import EventImages
+from evplace.sources.readers import open_recording
 
 SIZE = (8, 6)
 GOOD: dict[str, Any] = {
@@ -88,3 +91,16 @@ def test_packets_that_were_made_otherwise_are_checked_at_the_door(packet: Events
 def test_sensors_that_cannot_be(size: Any) -> None:
     with pytest.raises(InputError, match="cannot be"):
         Events.of([0], [0], [0], [1], size)
+
+
+def test_what_a_recording_gives_is_not_checked_again(tmp_path: Path) -> None:
+    np.savez(tmp_path / "made.npz", t_us=GOOD["t_us"], x=GOOD["x"], y=GOOD["y"], p=GOOD["p"])
+    (packet,) = open_recording(tmp_path / "made.npz", SIZE).packets()
+    assert packet.checked
+    assert packet[1:].checked
+    assert not packet[::-1].checked
+    assert not replace(packet, x=packet.y).checked
+    assert not Events.of(**GOOD, size=SIZE).checked
+    for other in (packet[::-1], replace(packet, t_us=packet.t_us[::-1])):
+        with pytest.raises(InputError, match="earlier than the one before"):
+            list(EventImages(SIZE).push(other))
