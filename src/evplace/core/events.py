@@ -66,7 +66,7 @@ class Events:
             np.ascontiguousarray(_brighter(p)),
             size,
         )
-        if not (len(size) == 2 and all(0 < side <= 1 << 16 for side in size)):
+        if not _is_size(size):
             raise InputError(f"a sensor of {size} pixels cannot be: give width and height, up to 65,536")
         found.check()
         return found
@@ -116,12 +116,24 @@ class Events:
 _KINDS = (np.dtype(np.int64), np.dtype(np.uint16), np.dtype(np.uint16), np.dtype(np.bool_))
 
 
+def _is_size(size: object) -> bool:
+    sides = list(size) if isinstance(size, tuple | list | np.ndarray) else []
+    return len(sides) == 2 and all(isinstance(n, int | np.integer) and 0 < n <= 1 << 16 for n in sides)
+
+
 def _whole(values: object, name: str, what: str) -> NDArray[Any]:
     """Whole numbers as an array; InputError for others."""
-    array = np.asarray(values)
+    try:
+        array = np.asarray(values)
+    except ValueError as error:  # lists of several lengths
+        raise InputError(f"the {name} of events are whole {what}, one each: {error}") from error
     if array.dtype.kind not in "iu" and array.size:
         hint = ": round seconds times 1e6" if name == "t_us" and array.dtype.kind == "f" else ""
         raise InputError(f"the {name} of events are whole {what}, not {array.dtype}{hint}")
+    if array.dtype.kind == "u" and array.size and array.max() > np.iinfo(np.int64).max:
+        raise InputError(f"the {name} of events is {array.max()}: no clock counts so far")
+    if np.ma.is_masked(values):
+        raise InputError(f"the {name} of events is masked at some: leave these events out")
     return array
 
 
