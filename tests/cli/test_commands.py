@@ -98,6 +98,15 @@ def test_train_localize_evaluate_compare(files: Path, street: Path, tmp_path: Pa
     assert main(["compare", f"{tmp_path}/a.result", f"{tmp_path}/b.result"]) == 0
 
 
+def test_matches_that_lie_aside_are_told(
+    files: Path, street: Path, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("evplace.cli.evaluate.aside", lambda result: f"{len(result.t_us)} lie aside")
+    query = ("evaluate", street, files / "night.aedat4", "--track", files / "night.csv", "--matcher", "best")
+    assert main([*map(str, query), "-o", f"{tmp_path}/a.result"]) == 0
+    assert "evplace: 60 lie aside\n" in capsys.readouterr().err
+
+
 def test_a_traverse_is_answered_as_its_recording_is(
     files: Path, street: Path, tmp_path: Path, capsys: Capture
 ) -> None:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from evplace.cli._output import in_flags
+from evplace.cli._output import in_flags, print_facts, print_table, say
+
+EVIL = "a\nb\x1b[2J[/]\udcff"
+"""As a file may be called."""
 
 
 @pytest.mark.parametrize(
@@ -23,3 +26,17 @@ from evplace.cli._output import in_flags
 )
 def test_arguments_are_shown_as_flags(text: str, shown: str) -> None:
     assert in_flags(text) == shown
+
+
+def test_names_move_no_cursor_and_break_no_line(capsys: pytest.CaptureFixture[str]) -> None:
+    say(EVIL, "next")
+    print_facts(EVIL, {"file": EVIL})
+    lines = capsys.readouterr().out.splitlines()
+    escaped = "a\\nb\\x1b[2J[/]\\udcff"
+    assert lines == [escaped, "next", escaped, f"  file  {escaped}"]
+
+
+def test_names_in_a_table_are_no_marks(capsys: pytest.CaptureFixture[str]) -> None:
+    print_table(EVIL, [EVIL, "figure"], [[EVIL, 1.0]])
+    lines = capsys.readouterr().out.splitlines()
+    assert len([line for line in lines if "a\\nb\\x1b[2J[/]\\udcff" in line]) == 3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from evplace.core.errors import InputError
 from evplace.core.events import Events
 from evplace.imaging.stream import EventImages
+from evplace.sources.readers import open_recording
 
 SIZE = (8, 6)
 GOOD: dict[str, Any] = {
@@ -88,3 +91,44 @@ def test_packets_that_were_made_otherwise_are_checked_at_the_door(packet: Events
 def test_sensors_that_cannot_be(size: Any) -> None:
     with pytest.raises(InputError, match="cannot be"):
         Events.of([0], [0], [0], [1], size)
+
+
+def test_what_a_recording_gives_is_not_checked_again(tmp_path: Path) -> None:
+    np.savez(tmp_path / "made.npz", t_us=GOOD["t_us"], x=GOOD["x"], y=GOOD["y"], p=GOOD["p"])
+    (packet,) = open_recording(tmp_path / "made.npz", SIZE).packets()
+    assert packet.checked
+    assert packet[1:].checked
+    assert not packet[::-1].checked
+    assert not replace(packet, x=packet.y).checked
+    assert not Events.of(**GOOD, size=SIZE).checked
+    for other in (packet[::-1], replace(packet, t_us=packet.t_us[::-1])):
+        with pytest.raises(InputError, match="earlier than the one before"):
+            list(EventImages(SIZE).push(other))
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "words"),
+    [
+        ("t_us", np.array([1, 2, 3, 2**63 + 5], "u8"), "no clock counts so far"),
+        ("t_us", np.ma.array([1, 2, 3, 4], mask=[0, 0, 1, 0]), "is masked at some"),
+        ("x", [[1], [1, 2], [1], [1]], "whole columns, one each"),
+        ("size", None, "cannot be"),
+        ("size", (8.0, 6.0), "cannot be"),
+        ("size", "8x6", "cannot be"),
+    ],
+)
+def test_what_numpy_would_make_something_of(name: str, values: Any, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Events.of(**(GOOD | {"size": SIZE} | {name: values}))
+
+
+@pytest.mark.parametrize("packet", [None, ([0], [0], [0], [1]), np.zeros((4, 4))])
+def test_packets_are_events(packet: Any) -> None:
+    with pytest.raises(InputError, match="packets are Events, not"):
+        list(EventImages(SIZE).push(packet))
+
+
+def test_a_packet_of_another_sensor_is_held_against_that_of_the_images() -> None:
+    packet = Events.of([0, 1, 50_000], [100, 2, 1], [0, 0, 0], [1, 1, 1], (640, 480))
+    with pytest.raises(InputError, match=r"a packet is of a \(640, 480\) sensor, these images are of"):
+        list(EventImages(SIZE).push(packet))

@@ -26,13 +26,14 @@ USED_GOOD_PART = 3
 """Exit code where a recording is damaged and its good part was used."""
 
 
-def in_flags(text: str) -> str:
-    """A text of the library on one line, its arguments as flags: `time_unit` is --time-unit.
+def shown(text: str) -> str:
+    """A text on one line; what no terminal shows, such as codes in a file's name, is escaped."""
+    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
 
-    What no terminal shows, such as codes in a file's names, is escaped.
-    """
-    shown = "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in text)
-    return ARGUMENT.sub(_flag, OF_TRACK.sub(r"--track-set \1=\2", shown))
+
+def in_flags(text: str) -> str:
+    """A text of the library as `shown`, its arguments as flags: `time_unit` is --time-unit."""
+    return ARGUMENT.sub(_flag, OF_TRACK.sub(r"--track-set \1=\2", shown(text)))
 
 
 def _flag(argument: re.Match[str]) -> str:
@@ -42,6 +43,11 @@ def _flag(argument: re.Match[str]) -> str:
     if value in (None, "True"):
         return f"--{name}"
     return f"--no-{name}" if value == "False" else f"--{name} {value}"
+
+
+def say(*lines: str) -> None:
+    """Lines for people on standard output, each as `shown`."""
+    print("\n".join(map(shown, lines)))
 
 
 def print_json(value: object) -> None:
@@ -54,10 +60,13 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
     from rich import box
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-    table = Table(*columns, title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    table = Table(title=Text(shown(title)), title_justify="left", box=box.SIMPLE_HEAD)
+    for column in columns:
+        table.add_column(Text(shown(column)))  # as it is: [x] is none of rich's marks
     for row in rows:
-        table.add_row(*[cell if isinstance(cell, str) else _text(cell) for cell in row])
+        table.add_row(*[Text(shown(cell) if isinstance(cell, str) else _text(cell)) for cell in row])
     Console(width=None if sys.stdout.isatty() else 160).print(table)
 
 
@@ -73,9 +82,7 @@ def print_settings(settings: Mapping[str, tuple[object, str]], as_json: bool) ->
 def print_facts(title: str, facts: Mapping[str, object]) -> None:
     """Names and values for people; a mapping is written as its counts above zero."""
     width = max(len(name) for name in facts)
-    print(title)
-    for name, value in facts.items():
-        print(f"  {name:<{width}}  {_text(value)}")
+    say(title, *(f"  {name:<{width}}  {_text(value)}" for name, value in facts.items()))
 
 
 def note(text: str) -> None:

@@ -21,7 +21,7 @@ from typing import Annotated
 
 import tyro
 
-from evplace.cli._output import USED_GOOD_PART, in_flags, note, print_json
+from evplace.cli._output import USED_GOOD_PART, in_flags, note, print_json, say
 from evplace.cli._recording import RecordingFlags
 from evplace.cli._settings import a_part_of
 from evplace.cli._track import TrackFlags
@@ -77,7 +77,7 @@ def run(args: Args) -> int:
     if args.json:
         print_json(as_json(found))
     else:
-        print("\n".join(_lines(found)))
+        say(*_lines(found))
     if found.fault is not None:
         note(f"{found.fault}; the good part was examined")
     return USED_GOOD_PART if found.fault is not None else 0

@@ -25,6 +25,7 @@ from evplace.cli._track import TrackFlags
 from evplace.core.errors import MissingExtraError, SettingsError
 from evplace.core.storage import check_new_folder
 from evplace.evaluation import MARK
+from evplace.evaluation._aside import aside
 from evplace.evaluation._evaluate import evaluate
 from evplace.evaluation.charts import curve_chart, reliability_chart
 from evplace.evaluation.truth import Truth, by_frames, by_matrix
@@ -111,6 +112,8 @@ def run(args: Args) -> int:
         shown = {name: result.figures[name] for name in SHOWN if result.figures.get(name) is not None}
         print_facts(f"{args.out}: {TIMINGS[args.answers]}", shown)
     note_guesses(query.info.get("notes"))
+    if told := aside(result):
+        note(told)
     note_matches(where, result.figures["judged"], int(result.answers.accepted.sum()))
     if query.info.get("fault"):
         note(f"{query.info['fault']}; the good part was measured")

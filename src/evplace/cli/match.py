@@ -19,7 +19,7 @@ from typing import Annotated, ClassVar, Literal
 
 import tyro
 
-from evplace.cli._output import note
+from evplace.cli._output import note, say
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.core import families
 from evplace.matchers import Matcher, _files
@@ -78,5 +78,5 @@ def run(args: Args) -> int:
     if args.json:
         print(json.dumps(figures))
     else:
-        print(f"{figures['accepted']} of {queries} queries matched to {references} references: {args.output}")
+        say(f"{figures['accepted']} of {queries} queries matched to {references} references: {args.output}")
     return 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +28,19 @@ def check_drawing() -> None:
 
 
 def save(figure: Any, path: str | Path) -> None:
-    """Write a figure as a .png, whole or not at all, without the upper and right edges of its axes."""
+    """Write a figure as a .png, whole or not at all, without the upper and right edges of its axes.
+
+    Its texts, which may be names of files, are drawn as they are: a $ begins no formula, and a letter that
+    the font lacks is an empty box.
+    """
+    from matplotlib.text import Text
+
     for axes in figure.axes:
         axes.spines[["top", "right"]].set_visible(False)
-    with new_file(path, overwrite=True) as partial:
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
+    with new_file(path, overwrite=True) as partial, warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
         figure.savefig(partial, dpi=120, metadata={"Software": DRAWN_BY})
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.errors import InputError
 from evplace.core.events import Events, Size
 from evplace.imaging.images import Imager
 from evplace.imaging.recipe import Recipe
@@ -31,6 +32,7 @@ class EventImages:
     def __init__(self, size: Size, recipe: Recipe | None = None, mask: Mask | None = None) -> None:
         """For a sensor of `size` (width, height) in pixels; `mask` (H, W) is True at pixels to leave out."""
         recipe = recipe or Recipe()
+        self._size = tuple(size)
         self._cleaner = Cleaner(size, recipe.cleaning, mask)
         self._windows = open_windows(recipe.windows)
         self._imager = Imager(size, recipe.images)
@@ -49,6 +51,10 @@ class EventImages:
 
         InputError where they are no packet, or come before those pushed already.
         """
+        if not isinstance(events, Events):
+            raise InputError(f"packets are Events, not {type(events).__name__}: make them with Events.of")
+        if tuple(events.size) != self._size:
+            raise InputError(f"a packet is of a {events.size} sensor, these images are of {self._size}")
         events.check(self._last_us)
         self._last_us = int(events.t_us[-1]) if len(events) else self._last_us
         self._take_marked()

@@ -18,7 +18,7 @@ from typing import Annotated
 
 import tyro
 
-from evplace.cli._output import print_json, progress
+from evplace.cli._output import print_json, progress, say
 from evplace.cli._settings import SettingsFlags
 from evplace.core.errors import SettingsError
 from evplace_lab.city import CitySettings, generate, moving_preview, preview
@@ -57,5 +57,5 @@ def run(args: Args) -> int:
     if args.json:
         print_json({"drives": [str(drive) for drive in drives]})
     else:
-        print("\n".join(map(str, drives)))
+        say(*map(str, drives))
     return 0

@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evplace.cli._output import Show, print_json, print_table, progress
+from evplace.cli._output import Show, print_json, print_table, progress, say
 from evplace.core.errors import MissingExtraError, SettingsError
 from evplace.core.storage import new_file, write_json
 from evplace.evaluation import Result
@@ -87,14 +87,17 @@ def run(args: Args) -> int:
         print_json({"rows": rows})
         return 0
     _print(rows)
-    print(f"\n{_sentence(rows)}\n")
-    print(f"To look at: {page}. The same in Python, on your own drives:\n")
-    print(
-        "  import evplace as ev\n"
-        f'  day = ev.open_traverse("{args.out}/city/day-1/ideal")\n'
-        "  street = ev.train(day, ev.PlaceGrid.from_track(day.track, cell_m=20))\n"
-        f'  night = ev.open_traverse("{args.out}/city/night-1/ideal")\n'
-        '  print(ev.evaluate(ev.Localizer(street), night).figures["accuracy"])'
+    say(
+        "",
+        _sentence(rows),
+        "",
+        f"To look at: {page}. The same in Python, on your own drives:",
+        "",
+        "  import evplace as ev",
+        f'  day = ev.open_traverse("{args.out}/city/day-1/ideal")',
+        "  street = ev.train(day, ev.PlaceGrid.from_track(day.track, cell_m=20))",
+        f'  night = ev.open_traverse("{args.out}/city/night-1/ideal")',
+        '  print(ev.evaluate(ev.Localizer(street), night).figures["accuracy"])',
     )
     return 0
 

@@ -17,7 +17,7 @@ from typing import Annotated
 
 import tyro
 
-from evplace.cli._output import note, print_json
+from evplace.cli._output import note, print_json, say
 from evplace_lab.report import report
 
 
@@ -41,9 +41,7 @@ def run(args: Args) -> int:
     if args.json:
         print_json({"page": str(written.page), "plots": [str(plot) for plot in written.plots]})
     else:
-        print(f"{written.page}: open it in any browser")
-        for plot in written.plots:
-            print(f"  {plot}")
+        say(f"{written.page}: open it in any browser", *(f"  {plot}" for plot in written.plots))
     if written.remark:
         note(written.remark)
     return 0

@@ -22,7 +22,7 @@ from typing import Annotated
 
 import tyro
 
-from evplace.cli._output import print_json, print_table, progress
+from evplace.cli._output import print_json, print_table, progress, say
 from evplace.cli._settings import Pairs, a_part_of
 from evplace.core import families
 from evplace_lab.reproduction import Choice, reproduce
@@ -68,6 +68,8 @@ def run(args: Args) -> int:
     for table in families.load("reproduction", args.name).tables(document):
         print_table(*table)
     minutes = document["cpu_s"] / 60
-    print(f"Kept in {args.out}/{args.name}.json, {minutes:.1f} minutes of one core in all")
-    print(f"evplace report {args.out} makes a page of it")
+    say(
+        f"Kept in {args.out}/{args.name}.json, {minutes:.1f} minutes of one core in all",
+        f"evplace report {args.out} makes a page of it",
+    )
     return 0

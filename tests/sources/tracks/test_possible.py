@@ -283,6 +283,17 @@ def test_clocks_set_by_a_little_or_much_at_any_speed(tmp_path: Path, kind: str, 
     assert asked >= 20
 
 
+@pytest.mark.parametrize("seconds", [-5, -1, 1, 5])
+def test_clocks_that_were_set_among_stamps_that_jitter(tmp_path: Path, seconds: int) -> None:
+    """A computer stamped the fixes as they came, so that no step is usual."""
+    log, rng = winding(28, 5), np.random.default_rng(0)
+    log.t_s += rng.uniform(-0.15, 0.15, len(log.t_s))
+    assert len(open_track(written(tmp_path, csv_log(log)))) > 250
+    log.t_s[100:] += seconds
+    with pytest.raises(TrackError, match=rf"clock was set by \{seconds:+d} s "):
+        open_track(written(tmp_path, csv_log(log)))
+
+
 def test_a_clock_that_was_set_is_taken_as_it_is_on_demand(tmp_path: Path) -> None:
     log = winding(28, 1)
     log.t_s[40:] += 1

@@ -146,7 +146,7 @@ class Recording:
 
     def _delivered(self, block: Block) -> Iterator[Events]:
         """The block in packets, each counted before it is handed out."""
-        events = Events(block.t_us, block.x, block.y, block.p, self.size)
+        events = Events(block.t_us, block.x, block.y, block.p, self.size).as_checked()
         for start in range(0, len(events), PACKET):
             packet = events[start : start + PACKET]
             self.events = (self.events or 0) + len(packet)

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import TrackError
 from evplace.sources.tracks._fixes import Bools, Fixes, Floats, Keep
-from evplace.sources.tracks._steps import AROUND, MOVING_MPS, SLACK_M
+from evplace.sources.tracks._steps import AROUND, BASE_US, MOVING_MPS, NEAR_US, SLACK_M
 
 UNIT_US = 1_000_000
 """Clocks are set by about whole seconds."""
-SET_US = 900_000
+SET_US = 700_000
 """What a clock is set by at least,"""
 WRONG_M = 20.0
 """and by how much it then places something wrongly, at least: less is no more than the noise."""
+JITTERS = 3.0
+"""And so many times what steps usually differ by."""
 NEAREST = 3
 """Steps before and after that say how a vehicle moved when the clock was set."""
 REGULAR = 0.8
@@ -48,21 +52,48 @@ def in_order(fixes: Fixes, keep: Keep | None = None) -> Fixes:
 
 
 def _clock_s(fixes: Fixes) -> NDArray[np.int64]:
-    """(N,) seconds by which the clock was set so far, in the order of the file."""
+    """(N,) seconds by which the clock was set so far, in the order of the file.
+
+    Where the steps are irregular, as of fixes that a computer stamped as they came, those of a second are
+    looked at.
+    """
     assert fixes.xy is not None
-    moved, steps_us = np.diff(fixes.xy, axis=0), np.diff(fixes.t_us)
+    clock_us = np.zeros(len(fixes))
+    for stride in (1, _in_a_second(fixes.t_us)):
+        found = _sets(fixes.t_us[::stride], fixes.xy[::stride])
+        if found is not None:
+            break
+    for n, off_us in (found or {}).items():
+        steps_us = np.diff(fixes.t_us[n * stride : (n + 1) * stride + 1])
+        clock_us[n * stride + 1 + np.argmax(np.abs(steps_us))] = off_us
+    return np.round(np.cumsum(clock_us) / UNIT_US).astype(np.int64)
+
+
+def _in_a_second(t_us: NDArray[np.int64]) -> int:
+    """How many fixes the log has in a second, at least 1."""
+    steps_us = np.diff(t_us)
+    near = steps_us[(steps_us >= 0) & (steps_us <= NEAR_US)]
+    return max(1, math.ceil(BASE_US / near.mean())) if near.any() else 1
+
+
+def _sets(t_us: NDArray[np.int64], xy: Floats) -> dict[int, float] | None:
+    """The steps in which the clock was set, and by how many microseconds; None where none is usual."""
+    moved, steps_us = np.diff(xy, axis=0), np.diff(t_us)
     ahead = steps_us[steps_us > 0]
     usual_us = float(np.median(ahead)) if len(ahead) else 0.0
     regular = np.abs(steps_us - usual_us) <= usual_us / 2
-    clock_us = np.zeros(len(fixes))
-    if len(ahead) and np.mean(regular) >= REGULAR:
-        fastest = float(np.percentile(np.hypot(*moved[regular].T), 95)) / usual_us
-        off_us = steps_us - usual_us
-        harmful = (np.abs(off_us) > max(SET_US, usual_us / 2)) & (np.abs(off_us) * fastest > WRONG_M)
-        for n in np.flatnonzero(harmful).tolist():
-            if _is_usual(moved, regular, n, usual_us, float(off_us[n])):
-                clock_us[n + 1] = off_us[n]
-    return np.round(np.cumsum(clock_us) / UNIT_US).astype(np.int64)
+    if not len(ahead) or np.mean(regular) < REGULAR:
+        return None
+    usual_us = float(np.mean(steps_us[regular]))  # of long and short steps in turn, the middle is one
+    off_us = steps_us - usual_us
+    fastest = float(np.percentile(np.hypot(*moved[regular].T), 95)) / usual_us
+    least_us = max(SET_US, JITTERS * float(np.median(np.abs(off_us))))
+    harmful = (np.abs(off_us) > least_us) & (np.abs(off_us) * fastest > WRONG_M)
+    return {
+        n: float(off_us[n])
+        for n in np.flatnonzero(harmful).tolist()
+        if _is_usual(moved, regular, n, usual_us, float(off_us[n]))
+    }
 
 
 def _is_usual(moved: Floats, regular: Bools, n: int, usual_us: float, off_us: float) -> bool:
