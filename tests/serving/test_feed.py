@@ -199,6 +199,19 @@ def test_a_source_that_waits_loses_nothing(drive: Events) -> None:
     assert feed.counters().skipped == 0
 
 
+def test_a_source_that_waits_for_room_is_closed_all_the_same(drive: Events) -> None:
+    source = Made(pace=0, waits=True)
+    source.put(*(block(drive[start : start + 1000]) for start in range(0, 3000, 1000)))
+    feed = Feed(source, SIZE, hold=1000)
+    feed.start()
+    until_s = time.monotonic() + HANG_S
+    while feed.counters().backlog < 1000:
+        assert time.monotonic() < until_s
+        time.sleep(0.001)
+    feed.close()
+    ended(feed)
+
+
 def test_a_mark_is_not_lost_with_the_events_that_carried_it(drive: Events) -> None:
     source = Made()
     source.put(block(drive[:1000]), ANEW, block(drive[:1000]), block(drive[1000:2000]))
