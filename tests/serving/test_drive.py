@@ -219,6 +219,18 @@ def test_a_source_that_has_not_said_that_nothing_came_is_late_not_silent(
     assert driven.feed.counters().skipped == 0
 
 
+def test_the_rate_is_that_of_what_comes_however_late_it_is_localised(
+    image_map: PlaceMap, night_drive: Drive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    events = night_drive.events
+    driven = Simulated(image_map, monkeypatch)
+    driven.send(events)
+    wanted = len(events) / 2.0  # it takes two seconds
+    assert driven.reports[-1].rate == pytest.approx(wanted, rel=0.1)
+    driven.wait(3.0)
+    assert driven.reports[-1].rate == 0
+
+
 def test_a_clock_that_goes_back_costs_no_more_than_a_window(
     image_map: PlaceMap, night_drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:

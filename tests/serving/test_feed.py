@@ -8,6 +8,7 @@ import time
 import tracemalloc
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -187,6 +188,22 @@ def test_too_much_drops_the_oldest_and_counts_it(drive: Events) -> None:
     assert (counters.backlog, counters.skipped) == (3000, 7000)
     assert counters.overflows > 0
     np.testing.assert_array_equal(events_of(taken(feed)).t_us, drive.t_us[7000:10_000])
+
+
+def test_what_waits_too_long_is_dropped_once_more_comes(
+    drive: Events, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However few events there are: a localizer that is held up goes on with what is now."""
+    now_s = [100.0]
+    clock = SimpleNamespace(monotonic=lambda: now_s[0])
+    monkeypatch.setattr("evplace.serving._feed.time", clock)
+    feed = Feed(Made(), SIZE)
+    for start in range(0, 5000, 1000):
+        feed._push(block(drive[start : start + 1000]))
+        feed._push(None)
+        now_s[0] += 0.9
+    counters = feed.counters()
+    assert (counters.backlog, counters.skipped, counters.overflows) == (3000, 2000, 2)
 
 
 def test_a_source_that_waits_loses_nothing(drive: Events) -> None:

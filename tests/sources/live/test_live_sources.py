@@ -284,7 +284,11 @@ def test_wrong_addresses_are_one_line() -> None:
 def test_every_source_ends_when_it_is_told_to(tmp_path: Path) -> None:
     reading, writing = os.pipe()
     silent = Piped(reading, None, SIZE, 0.0)
-    for live in (open_live("udp:0", SIZE), open_live(f"tail:{tmp_path / 'never'}", SIZE), silent):
+    write_recording(tmp_path / "drive.raw", [make_drive(windows=3).events], SIZE)
+    paused = open_live(str(tmp_path / "drive.raw"))
+    assert isinstance(paused, Replaying)
+    paused.change(paused=True)
+    for live in (open_live("udp:0", SIZE), open_live(f"tail:{tmp_path / 'never'}", SIZE), silent, paused):
         items: Iterator[Any] = live.blocks()
         assert next(items) is None
         ended = threading.Event()
