@@ -57,7 +57,8 @@ class Drive:
         self._closed = True
         self.feed.close()
         self.feed.join(seconds / 2)
-        self._thread.join(seconds / 2)
+        if self._thread.ident is not None:
+            self._thread.join(seconds / 2)
 
     def _run(self) -> None:
         try:

@@ -109,8 +109,9 @@ class Feed:
             self._change.notify_all()
 
     def join(self, seconds: float) -> None:
-        """Wait until the reading has ended, but no longer."""
-        self._thread.join(seconds)
+        """Wait until the reading has ended, but no longer; it may not have begun."""
+        if self._thread.ident is not None:
+            self._thread.join(seconds)
 
     def skip(self, events: int) -> None:
         """Count events that came too late to be localised."""
