@@ -30,6 +30,7 @@ from evplace.cli._settings import Pairs, Part
 from evplace.core import families
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
+from evplace.serving._recorder import Recorder
 from evplace.serving.nmea import sentences
 from evplace.serving.outputs import Output
 from evplace.serving.server import Stop, bound, check_web, serve
@@ -164,8 +165,15 @@ def _say_end(service: Service) -> None:
             note(fault)
     counters = service.feed.counters()
     skipped = f", {counters.skipped:,} skipped" if counters.skipped else ""
-    recorded = f", {counters.recorded:,} recorded in {service.record}" if service.recorder else ""
-    note(f"ended after {counters.events:,} events{skipped}{recorded}")
+    note(f"ended after {counters.events:,} events{skipped}{_recorded(service.recorder)}")
+
+
+def _recorded(recorder: Recorder | None) -> str:
+    """How much was recorded, and where; a camera that was started again has begun a second file."""
+    if recorder is None:
+        return ""
+    files = ", ".join(map(str, recorder.files)) or "no file"
+    return f", {recorder.events:,} recorded in {files}"
 
 
 def _shown(host: str) -> str:
