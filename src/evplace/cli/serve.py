@@ -23,6 +23,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
+from urllib.parse import quote
 
 from evplace.cli._matcher import MatcherFlags
 from evplace.cli._output import note, note_guesses
@@ -138,7 +139,7 @@ def opened(args: Args) -> Iterator[Service]:
 
 async def _serve(args: Args, service: Service, listening: Any, token: str | None, address: str) -> None:
     def ready(stop: Stop) -> None:
-        query = f"?token={token}" if token and args.token else ""
+        query = f"?token={quote(token, safe='')}" if token and args.token else ""
         note(f"{args.source} is localised in {args.map}: open {address}{query}; Ctrl-C ends it")
         if args.open and _has_screen():
             webbrowser.open(address + query)
