@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +59,6 @@ def test_localize_watches(
     shown = capsys.readouterr().out.splitlines()
     assert len(shown) > 4
     assert all("localised" in one for one in shown)
-    assert not {"source", "drive"} & {thread.name for thread in threading.enumerate()}
     assert main([*arguments, "--json"]) == 2
     assert "--watch shows lines in a terminal" in capsys.readouterr().err
 
