@@ -5,8 +5,8 @@
     python bench/bench_live.py --seconds 600       ten minutes of 20 Mev/s
 
 Events are generated: 1280x720 pixels, 20 million a second, at random pixels; the map has 2000 images. CPU
-time where that is said, else by the clock, with the machine's load beside it. What runs for long runs in a
-process of its own that loads the map, as `evplace serve` does: its memory is a service's, not that of training.
+time where that is said, else by the clock, with the machine's load beside it. What runs for long runs in
+a process of its own that loads the map, as `evplace serve` does: its memory is that of a service.
 """
 
 from __future__ import annotations

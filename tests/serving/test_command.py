@@ -223,6 +223,9 @@ def test_garbage_on_the_network_changes_nothing(folder: Path, night_drive: Drive
     [
         (["--source", "missing.raw"], "cannot read missing.raw"),
         (["--source", "udp:nowhere"], "'nowhere' is no address"),
+        (["--source", "bogus:1"], "'bogus' of bogus:1 is no kind of live source, and there is no such file"),
+        (["--source", "night.raw", "--lines", "nowhere/lines"], "cannot write to nowhere/lines"),
+        (["--source", "night.raw", "--nmea", "udp:nowhere"], "'nowhere' is no address"),
         (["--source", "night.raw", "--source-set", "sped=2"], "unknown setting 'sped'"),
         (["--source", "night.raw", "--host", "0.0.0.0"], "give a --token"),
         (["--source", "night.raw", "--record", "came.npz"], "can only be written at the end"),
@@ -241,6 +244,19 @@ def test_what_is_wrong_is_one_line(
     said = capsys.readouterr().err.strip().splitlines()
     assert len(said) == 1
     assert words in said[0]
+
+
+def test_no_router_to_publish_to_is_one_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed: pip install 'evplace[live]'")
+    with socket.socket() as any_one:
+        any_one.bind(("127.0.0.1", 0))
+        router = f"tcp/127.0.0.1:{any_one.getsockname()[1]}"
+    arguments = ["serve", "--map", f"{folder}/street.evp", "--source", f"{folder}/night.raw", "--port", "0"]
+    assert main([*arguments, "--zenoh", "evplace", "--zenoh-router", router]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"evplace: no zenoh router at {router}: start one ")
+    assert said.count("\n") == 1
+    assert ".rs" not in said
 
 
 def test_a_port_in_use_is_one_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,10 +18,11 @@ import numpy as np
 import pytest
 from made_sources import Made, block
 
-from conftest import HANG_S, Drive, make_drive
+from conftest import HANG_S, Drive, make_drive, make_traverse
 from evplace.core.events import Events
 from evplace.localizer import Localizer, Match
-from evplace.placemap import PlaceMap
+from evplace.placemap import PlaceMap, train
+from evplace.places import PlaceGrid
 from evplace.serving._drive import Drive as LiveDrive
 from evplace.serving._feed import Feed
 from evplace.serving._report import Describer, Report
@@ -219,6 +220,18 @@ def test_a_source_that_has_not_said_that_nothing_came_is_late_not_silent(
     assert driven.feed.counters().skipped == 0
 
 
+def test_the_rate_is_that_of_what_comes_however_late_it_is_localised(
+    image_map: PlaceMap, night_drive: Drive, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    events = night_drive.events
+    driven = Simulated(image_map, monkeypatch)
+    driven.send(events)
+    wanted = len(events) / 2.0  # it takes two seconds
+    assert driven.reports[-1].rate == pytest.approx(wanted, rel=0.1)
+    driven.wait(3.0)
+    assert driven.reports[-1].rate == 0
+
+
 def test_a_clock_that_goes_back_costs_no_more_than_a_window(
     image_map: PlaceMap, night_drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -233,6 +246,65 @@ def test_a_clock_that_goes_back_costs_no_more_than_a_window(
     assert {state for _, state in driven.states(set_back_s)} <= {"localised", "standing"}
     assert driven.feed.counters().rejected == {}
     assert len(driven.reports) >= len(offline(image_map, events)) - 2
+
+
+@pytest.fixture(scope="module")
+def long_map() -> PlaceMap:
+    """Six seconds of a street, 360 m."""
+    track = make_drive(windows=180).track
+    return train(make_traverse(make_drive(windows=180)), PlaceGrid.from_track(track), scorer="ncc")
+
+
+def test_a_camera_that_is_carried_elsewhere_is_found_there_within_three_seconds(
+    long_map: PlaceMap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From 120 m to 220 m of the street, without a gap in time."""
+    drive = make_drive(seed=1, windows=180, noise=0.02)
+    events = drive.events
+    leave, arrive = np.searchsorted(events.t_us, [2_000_000, 3_666_667]).tolist()
+    driven = Simulated(long_map, monkeypatch)
+    driven.send(events[:leave])
+    assert driven.reports[-1].match.state == "localised"
+    carried_s = driven.now_s
+    driven.send(moved(events[arrive:], -1_666_667))
+    right = []
+    for report in driven.reports:
+        if report.host_s > carried_s + 0.05:
+            easting, _ = drive.track.at(np.array([report.match.t_us + 1_666_667])).xy[0]
+            at = report.match.position
+            right.append(report.match.state == "localised" and at is not None and abs(at[0] - easting) <= 10)
+    assert len(right) > 60
+    back = right.index(True)
+    assert back < 3.0 * 30
+    assert np.mean(right[back:]) > 0.9
+
+
+def test_a_camera_that_sees_nothing_move_stands_and_one_that_sees_noise_is_not_localised(
+    long_map: PlaceMap, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(0)
+
+    def noise(start_us: int, count: int) -> Events:
+        """Two seconds of events at any pixels."""
+        t_us = np.sort(rng.integers(start_us, start_us + 2_000_000, count))
+        x, y = rng.integers(0, 80, count), rng.integers(0, 60, count)
+        return Events.of(t_us, x, y, rng.random(count) < 0.5, SIZE)
+
+    events = make_drive(seed=1, windows=180, noise=0.02).events
+    driven = Simulated(long_map, monkeypatch)
+    driven.send(events[: int(np.searchsorted(events.t_us, 2_000_000))])
+    place = driven.reports[-1].match.place
+    since_s = driven.now_s
+    driven.send(noise(2_000_000, 600))
+    states = [state for after_s, state in driven.states(since_s) if after_s > 1.0]
+    assert set(states) == {"standing"}
+    assert abs(driven.reports[-1].match.place - place) <= 1
+    since_s = driven.now_s
+    driven.send(noise(4_000_000, 40_000))
+    driven.send(noise(6_000_000, 40_000))
+    states = [state for after_s, state in driven.states(since_s) if after_s > 2.5]
+    assert len(states) > 30
+    assert set(states) <= {"lost", "unseen"}
 
 
 def test_events_that_come_after_their_window_was_closed_are_counted(

@@ -8,6 +8,7 @@ import time
 import tracemalloc
 from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -189,6 +190,22 @@ def test_too_much_drops_the_oldest_and_counts_it(drive: Events) -> None:
     np.testing.assert_array_equal(events_of(taken(feed)).t_us, drive.t_us[7000:10_000])
 
 
+def test_what_waits_too_long_is_dropped_once_more_comes(
+    drive: Events, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However few events there are: a localizer that is held up goes on with what is now."""
+    now_s = [100.0]
+    clock = SimpleNamespace(monotonic=lambda: now_s[0])
+    monkeypatch.setattr("evplace.serving._feed.time", clock)
+    feed = Feed(Made(), SIZE)
+    for start in range(0, 5000, 1000):
+        feed._push(block(drive[start : start + 1000]))
+        feed._push(None)
+        now_s[0] += 0.9
+    counters = feed.counters()
+    assert (counters.backlog, counters.skipped, counters.overflows) == (3000, 2000, 2)
+
+
 def test_a_source_that_waits_loses_nothing(drive: Events) -> None:
     source = Made(pace=0, waits=True)
     source.put(*(block(drive[start : start + 1000]) for start in range(0, 10_000, 1000)))
@@ -197,6 +214,19 @@ def test_a_source_that_waits_loses_nothing(drive: Events) -> None:
     feed.start()
     np.testing.assert_array_equal(events_of(taken(feed)).t_us, drive.t_us[:10_000])
     assert feed.counters().skipped == 0
+
+
+def test_a_source_that_waits_for_room_is_closed_all_the_same(drive: Events) -> None:
+    source = Made(pace=0, waits=True)
+    source.put(*(block(drive[start : start + 1000]) for start in range(0, 3000, 1000)))
+    feed = Feed(source, SIZE, hold=1000)
+    feed.start()
+    until_s = time.monotonic() + HANG_S
+    while feed.counters().backlog < 1000:
+        assert time.monotonic() < until_s
+        time.sleep(0.001)
+    feed.close()
+    ended(feed)
 
 
 def test_a_mark_is_not_lost_with_the_events_that_carried_it(drive: Events) -> None:

@@ -6,11 +6,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 
 from conftest import Drive
-from evplace.placemap import PlaceMap
+from evplace.imaging.traverse import Traverse
+from evplace.placemap import PlaceMap, train
+from evplace.places import PlaceGrid
 from evplace.sources.live import Live, open_live
+from evplace.sources.live.replay import Replaying
 from evplace.sources.writers import write_recording
 
 pytest.importorskip("starlette", reason="the page needs the extra 'web': pip install 'evplace[web]'")
@@ -32,6 +36,7 @@ SHOWN = """(() => {
 })()"""
 """A number that changes with the event image."""
 STATE = "document.body.dataset.state"
+ENDED = "document.getElementById('link-words')?.textContent === 'ended'"
 
 
 @pytest.fixture
@@ -43,6 +48,23 @@ def served(image_map: PlaceMap, night_drive: Drive, tmp_path: Path) -> Iterator[
         yield service
 
 
+@pytest.fixture(scope="module")
+def town(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A street of the city: a map by day, and the recording and the traverse of the same drive by night."""
+    from evplace_lab.city import CitySettings, generate
+
+    out = tmp_path_factory.mktemp("town")
+    small = CitySettings(
+        conditions=("day", "night"), paths=(1,), sensors=("ideal",), fps=30, width=64, height=48,
+        route_length_m=60.0, keep_events=True,
+    )  # fmt: skip
+    generate(out / "city", small, workers=1)
+    day = Traverse.load(out / "city" / "day-1" / "ideal")
+    assert day.track is not None
+    train(day, PlaceGrid.from_track(day.track)).save(out / "street.evp")
+    return out
+
+
 @pytest.fixture
 def tab(tmp_path: Path) -> Iterator[Tab]:
     with opened(tmp_path / "profile") as one:
@@ -52,6 +74,12 @@ def tab(tmp_path: Path) -> Iterator[Tab]:
 def open_page(tab: Tab, served: Served) -> None:
     tab.open(f"http://127.0.0.1:{served.port}/")
     tab.wait(f"document.body && {STATE} === 'localised'")
+
+
+def elsewhere(tab: Tab, served: Served) -> list[str]:
+    """What was asked of others than the service."""
+    asked = [url for url in tab.requests if not url.startswith(("data:", "about:"))]
+    return [url for url in asked if urlsplit(url).netloc != f"127.0.0.1:{served.port}"]
 
 
 def test_a_drive_is_seen_as_it_goes(tab: Tab, served: Served) -> None:
@@ -69,8 +97,51 @@ def test_a_drive_is_seen_as_it_goes(tab: Tab, served: Served) -> None:
     tab.wait(f"{label}.startsWith('The route from above: At place ')")
     assert tab.value("document.getElementById('spoken').textContent").startswith("At place ")
     assert tab.complaints == []
-    elsewhere = [url for url in tab.requests if urlsplit(url).netloc != f"127.0.0.1:{served.port}"]
-    assert [url for url in elsewhere if not url.startswith(("data:", "about:"))] == []
+    assert elsewhere(tab, served) == []
+
+
+HERE = "document.getElementById('utm')?.textContent"
+HERE_SHOWN = f"{HERE} !== '–' && {HERE}"
+
+
+def seen_at(tab: Tab) -> tuple[float, float]:
+    """Easting and northing as the page shows them."""
+    text: str = tab.wait(HERE_SHOWN)
+    easting, northing = text.removesuffix(" m").split(", ")
+    return float(easting), float(northing)
+
+
+def test_a_street_by_night_is_driven_along_the_map_of_the_day(tab: Tab, town: Path) -> None:
+    """What the page shows is where the car was; it is there again when the page is loaded again."""
+    night = Traverse.load(town / "city" / "night-1" / "ideal")
+    place_map = PlaceMap.load(town / "street.evp")
+    source = open_live(str(town / "city" / "night-1" / "ideal.aedat4"))
+    assert isinstance(source, Replaying)
+    source.change(paused=True)
+    tab.look(DESKTOP)
+    with serving(place_map, town / "street.evp", source, matcher=None) as served:
+        tab.open(f"http://127.0.0.1:{served.port}/")
+        tab.wait("document.getElementById('link-words')?.textContent === 'paused'")
+        tab.value("document.getElementById('pause').click()")
+        pictures, shown = set(), [seen_at(tab)]
+        while not tab.value(ENDED):
+            pictures.add(tab.value(SHOWN))
+            shown.append(seen_at(tab))
+            tab.wait(f"{HERE} !== '{shown[-1][0]:.1f}, {shown[-1][1]:.1f} m' || {ENDED}")
+        away = np.hypot(*(night.xy[:, None] - np.array(shown)).transpose(2, 0, 1))
+        assert away.min(axis=0).max() < 5
+        along = away.argmin(axis=0)
+        found = along[along.argmin() :]  # the first images alone may be of other places a few metres away
+        assert len(found) > len(along) // 2
+        assert found[-1] - found[0] > len(night) // 2
+        assert (np.diff(found) >= -3).all()
+        assert len(pictures) > 3
+        assert "m along the route" in tab.value("document.getElementById('more').textContent")
+        tab.call("Page.reload")
+        assert seen_at(tab) == shown[-1]
+        tab.wait(ENDED)
+        assert tab.complaints == []
+        assert elsewhere(tab, served) == []
 
 
 @pytest.mark.parametrize("kind", [DESKTOP, PHONE])
@@ -118,6 +189,21 @@ def press(tab: Tab, key: str, code: int) -> None:
     text = {"text": key} if len(key) == 1 else {}
     for kind in ("keyDown", "keyUp"):
         tab.call("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=code, **text)
+
+
+def test_a_page_with_a_token_is_whole(
+    tab: Tab, image_map: PlaceMap, night_drive: Drive, tmp_path: Path
+) -> None:
+    """The token of its address is that of all it asks."""
+    image_map.save(tmp_path / "street.evp")
+    write_recording(tmp_path / "night.raw", [night_drive.events], (80, 60))
+    source = open_live(str(tmp_path / "night.raw"), loops=0, speed=0.5)
+    with serving(image_map, tmp_path / "street.evp", source, token="a/s&+ecret") as served:
+        tab.open(f"http://127.0.0.1:{served.port}/?token=a%2Fs%26%2Becret")
+        tab.wait(f"document.body && {STATE} === 'localised'")
+        tab.wait("document.getElementById('reference').naturalWidth === 160")
+        assert tab.value("getComputedStyle(document.body).margin") == "0px"
+        assert tab.complaints == []
 
 
 def test_it_connects_again_by_itself(

@@ -127,6 +127,33 @@ def test_metrics_are_prometheus_text(fed: Fed) -> None:
     assert re.search(r'evplace_matches_total\{state="localised"\} [1-9]', body.decode())
 
 
+def test_metrics_are_those_of_the_state(
+    image_map: PlaceMap, street: Path, night_drive: Drive, tmp_path: Path
+) -> None:
+    """Once a drive has ended that was recorded, and that began with an event outside the sensor."""
+    source = Made(pace=0)
+    with serving(image_map, street, source, record=tmp_path / "came.raw") as served:
+        outside = Events.of([0], [500], [0], [True], (640, 480))
+        source.put(block(outside), *(block(night_drive.events[at : at + 900]) for at in range(0, 9000, 900)))
+        source.end()
+        served.until(lambda: served.json("/state")["source"]["state"] == "ended")
+        served.until(lambda: served.json("/state")["counters"]["recorded"] == 9000)
+        lines = [line for line in served.ask("/metrics")[1].decode().splitlines() if line[0] != "#"]
+        said = {name: float(value) for name, _, value in (line.rpartition(" ") for line in lines)}
+        state = served.json("/state")
+        counters = state["counters"]
+    assert said["evplace_events_total"] == counters["events"] == 9000
+    assert said["evplace_events_recorded_total"] == 9000
+    assert said["evplace_backlog_events"] == said["evplace_events_skipped_total"] == 0
+    assert said['evplace_events_rejected_total{reason="out_of_range"}'] == 1
+    assert said['evplace_matches_total{state="localised"}'] == len(served.service.hub.recent)  # type: ignore[union-attr]
+    assert (
+        0
+        < said['evplace_latency_seconds{quantile="0.5"}']
+        <= said['evplace_latency_seconds{quantile="0.99"}']
+    )
+
+
 # Who may ask
 
 
@@ -170,6 +197,9 @@ def test_a_token_is_asked_of_everybody(image_map: PlaceMap, street: Path) -> Non
             assert served.ask(f"{path}?token=secret")[0] == 200
             assert served.ask(path, Authorization="Bearer secret")[0] == 200
             assert served.ask(path, Host="192.168.1.7", Authorization="Bearer secret")[0] == 200
+        for path in ("/page.css", "/page.js", "/icon.svg"):  # which a page asks for without one
+            assert served.ask(path)[0] == 200
+            assert served.ask(path, Host="evil.example")[0] == 421
         with pytest.raises(InvalidStatus, match="403"), served.listen("/live?token=wrong"):
             pass
         with served.listen("/live?token=secret"):

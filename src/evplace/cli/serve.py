@@ -23,6 +23,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
+from urllib.parse import quote
 
 from evplace.cli._matcher import MatcherFlags
 from evplace.cli._output import note, note_guesses
@@ -30,6 +31,7 @@ from evplace.cli._settings import Pairs, Part
 from evplace.core import families
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
+from evplace.serving._recorder import Recorder
 from evplace.serving.nmea import sentences
 from evplace.serving.outputs import Output
 from evplace.serving.server import Stop, bound, check_web, serve
@@ -137,7 +139,7 @@ def opened(args: Args) -> Iterator[Service]:
 
 async def _serve(args: Args, service: Service, listening: Any, token: str | None, address: str) -> None:
     def ready(stop: Stop) -> None:
-        query = f"?token={token}" if token and args.token else ""
+        query = f"?token={quote(token, safe='')}" if token and args.token else ""
         note(f"{args.source} is localised in {args.map}: open {address}{query}; Ctrl-C ends it")
         if args.open and _has_screen():
             webbrowser.open(address + query)
@@ -164,8 +166,15 @@ def _say_end(service: Service) -> None:
             note(fault)
     counters = service.feed.counters()
     skipped = f", {counters.skipped:,} skipped" if counters.skipped else ""
-    recorded = f", {counters.recorded:,} recorded in {service.record}" if service.recorder else ""
-    note(f"ended after {counters.events:,} events{skipped}{recorded}")
+    note(f"ended after {counters.events:,} events{skipped}{_recorded(service.recorder)}")
+
+
+def _recorded(recorder: Recorder | None) -> str:
+    """How much was recorded, and where; a camera that was started again has begun a second file."""
+    if recorder is None:
+        return ""
+    files = ", ".join(map(str, recorder.files)) or "no file"
+    return f", {recorder.events:,} recorded in {files}"
 
 
 def _shown(host: str) -> str:

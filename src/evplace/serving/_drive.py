@@ -44,7 +44,7 @@ class Drive:
         self._clock_us: float | None = None
         self._clock_s = 0.0
         self._ticked_us: int | None = None
-        self._seen: deque[tuple[float, int]] = deque()
+        self._came: deque[tuple[float, int]] = deque()
         self._thread = threading.Thread(target=self._run, name="drive", daemon=True)
 
     def start(self) -> None:
@@ -57,7 +57,8 @@ class Drive:
         self._closed = True
         self.feed.close()
         self.feed.join(seconds / 2)
-        self._thread.join(seconds / 2)
+        if self._thread.ident is not None:
+            self._thread.join(seconds / 2)
 
     def _run(self) -> None:
         try:
@@ -88,7 +89,6 @@ class Drive:
             late = int(np.searchsorted(events.t_us, self._ticked_us, "right"))
             self.feed.skip(late)
             events = events[late:]
-        self._seen.append((packet.came_s, len(packet.events)))
         if len(events):
             self._last_us = int(events.t_us[-1])
             self._clock_us, self._clock_s = float(self._last_us), packet.came_s
@@ -111,11 +111,13 @@ class Drive:
         for match in matches:
             now_s = time.monotonic()
             silent_s, counters = now_s - self.feed.last_s, self.feed.counters()
-            latency_s, rate = now_s - came_s, self._rate(now_s)
+            latency_s, rate = now_s - came_s, self._rate(now_s, counters.events)
             self._publish(Report(match, time.time(), latency_s, rate, silent_s, counters))
 
-    def _rate(self, now_s: float) -> float:
-        """Events a second, of those that came within RATE_S."""
-        while self._seen and self._seen[0][0] < now_s - RATE_S:
-            self._seen.popleft()
-        return sum(count for _, count in self._seen) / RATE_S
+    def _rate(self, now_s: float, events: int) -> float:
+        """Events a second that came within about RATE_S, of which so many have come by now."""
+        self._came.append((now_s, events))
+        while len(self._came) > 2 and self._came[1][0] <= now_s - RATE_S:
+            self._came.popleft()
+        before_s, before = self._came[0]
+        return (events - before) / (now_s - before_s) if now_s > before_s else 0.0

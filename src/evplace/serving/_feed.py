@@ -21,6 +21,8 @@ from evplace.sources.readers import Block
 
 HOLD = 6_000_000
 """Events that are held at most: 78 MB, 0.3 s at 20 million a second."""
+HOLD_S = 2.0
+"""Seconds that events wait at most once others come: an answer that is older helps no vehicle."""
 PACKETS = 4096
 """Packets that are held at most, whatever is in them."""
 PACKET = 100_000
@@ -107,8 +109,9 @@ class Feed:
             self._change.notify_all()
 
     def join(self, seconds: float) -> None:
-        """Wait until the reading has ended, but no longer."""
-        self._thread.join(seconds)
+        """Wait until the reading has ended, but no longer; it may not have begun."""
+        if self._thread.ident is not None:
+            self._thread.join(seconds)
 
     def skip(self, events: int) -> None:
         """Count events that came too late to be localised."""
@@ -187,7 +190,9 @@ class Feed:
 
     def _is_full(self, packet: Packet) -> bool:
         return bool(self._packets) and (
-            self._counters.backlog + len(packet.events) > self._hold or len(self._packets) >= PACKETS
+            self._counters.backlog + len(packet.events) > self._hold
+            or packet.came_s - self._packets[0].came_s > HOLD_S
+            or len(self._packets) >= PACKETS
         )
 
 

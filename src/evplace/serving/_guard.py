@@ -36,10 +36,18 @@ class Guard:
     """An ASGI application in front of another."""
 
     def __init__(
-        self, app: App, token: str | None, names: Iterable[str] = (), anywhere: bool = False
+        self,
+        app: App,
+        token: str | None,
+        names: Iterable[str] = (),
+        anywhere: bool = False,
+        free: Iterable[str] = (),
     ) -> None:
-        """`names` are Hosts that are right beside addresses; `anywhere` whether other machines may ask."""
-        self._app, self._token, self._anywhere = app, token, anywhere
+        """`names` are Hosts that are right beside addresses; `anywhere` whether other machines may ask.
+
+        The paths in `free` hold nothing of a drive and need no token: a page asks for its styles without.
+        """
+        self._app, self._token, self._anywhere, self._free = app, token, anywhere, frozenset(free)
         self._names = {"localhost", *(name.lower() for name in names)}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -64,7 +72,7 @@ class Guard:
         origin = headers.get("origin")
         if origin is not None and origin.lower() not in (f"http://{host}".lower(), f"https://{host}".lower()):
             return 403, "another page may not ask: its Origin is not this service's"
-        if self._token is not None and not self._has_token(scope, headers):
+        if not (self._token is None or scope["path"] in self._free or self._has_token(scope, headers)):
             return 401, "a token is needed: ?token=... or Authorization: Bearer ..."
         if _length(headers) > BODY:
             return 413, f"a request holds at most {BODY} bytes"

@@ -25,7 +25,7 @@ def _lines(service: Service, hub: Hub) -> Iterator[str]:
     yield from _metric("events_recorded_total", "counter", "Events written to the file.", counters.recorded)
     yield from _metric("backlog_events", "gauge", "Events that wait.", counters.backlog)
     yield from _head("events_rejected_total", "counter", "Events that cannot be.")
-    for reason, count in service.feed.counters().rejected.items():
+    for reason, count in counters.rejected.items():
         yield f'evplace_events_rejected_total{{reason="{reason}"}} {count}'
     yield from _head("matches_total", "counter", "Matches by state.")
     for state in STATES:

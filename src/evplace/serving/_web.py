@@ -22,6 +22,8 @@ from evplace.serving._metrics import prometheus
 from evplace.serving.service import Service
 
 PAGE = Path(__file__).parent / "page"
+PARTS = frozenset(f"/{file.name}" for file in PAGE.iterdir() if file.suffix != ".html")
+"""What the page is drawn with: styles, script and icon."""
 TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 SEND_S = 10.0
 """Seconds within which a client must take what it is sent."""
@@ -187,7 +189,3 @@ def _wanted(values: Any) -> tuple[bool | None, float | None, float]:
     ):
         raise ValueError
     return paused, None if speed is None else float(speed), float(by_s)
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6

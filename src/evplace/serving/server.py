@@ -77,14 +77,14 @@ async def serve(
     import uvicorn
 
     from evplace.serving._connections import Patient, Quiet
-    from evplace.serving._web import application
+    from evplace.serving._web import PARTS, application
 
     loop = asyncio.get_running_loop()
     service.start(loop)
     anywhere = listening.getsockname()[0] not in LOOPBACK
     logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)  # what goes wrong is said in one line
     config = uvicorn.Config(
-        Guard(application(service), token, names, anywhere),
+        Guard(application(service), token, names, anywhere, PARTS),
         http=Patient,
         ws="websockets-sansio",
         ws_max_size=4096,

@@ -282,8 +282,13 @@ def test_wrong_addresses_are_one_line() -> None:
 
 
 def test_every_source_ends_when_it_is_told_to(tmp_path: Path) -> None:
-    for text in ("udp:0", f"tail:{tmp_path / 'never'}"):
-        live = open_live(text, SIZE)
+    reading, writing = os.pipe()
+    silent = Piped(reading, None, SIZE, 0.0)
+    write_recording(tmp_path / "drive.raw", [make_drive(windows=3).events], SIZE)
+    paused = open_live(str(tmp_path / "drive.raw"))
+    assert isinstance(paused, Replaying)
+    paused.change(paused=True)
+    for live in (open_live("udp:0", SIZE), open_live(f"tail:{tmp_path / 'never'}", SIZE), silent, paused):
         items: Iterator[Any] = live.blocks()
         assert next(items) is None
         ended = threading.Event()
@@ -295,6 +300,8 @@ def test_every_source_ends_when_it_is_told_to(tmp_path: Path) -> None:
         threading.Thread(target=run, daemon=True).start()
         live.close()
         assert ended.wait(HANG_S)
+    os.close(reading)
+    os.close(writing)
 
 
 class Broken:

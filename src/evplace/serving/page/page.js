@@ -419,12 +419,13 @@ async function lookAtState() {
 }
 
 async function control(values) {
-  const answer = await fetch(address("replay"), {
-    method: "POST",
-    headers: { "Content-Type": "application/json" },
-    body: JSON.stringify(values),
-  });
-  if (answer.ok) showState(await json("state"));
+  try {
+    const body = JSON.stringify(values);
+    await fetch(address("replay"), { method: "POST", headers: { "Content-Type": "application/json" }, body });
+    showState(await json("state"));
+  } catch {
+    // the socket says that the connection is lost
+  }
 }
 
 $("pause").addEventListener("click", () => control({ paused: $("pause").getAttribute("aria-pressed") !== "true" }));

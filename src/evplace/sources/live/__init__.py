@@ -91,9 +91,10 @@ def address(text: str) -> tuple[str, str]:
     kind, colon, where = text.partition(":")
     if colon and kind in families.names("live") and not Path(text).exists():
         return kind, where.removeprefix("//")
-    if "://" in text:
+    if "://" in text or (colon and len(kind) > 1 and kind.isalpha() and not Path(text).exists()):
         raise SettingsError(
-            f"'{kind}' of {text} is no kind of live source: known are {', '.join(families.names('live'))}"
+            f"'{kind}' of {text} is no kind of live source, and there is no such file: known are "
+            f"{', '.join(families.names('live'))}"
         )
     return "replay", text
 

@@ -134,9 +134,10 @@ def session(router: str, mode: str, listen: str = "") -> Any:
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
+        reason = str(error).partition(" at /")[0].rstrip(" !")  # the rest is a line of zenoh's source
         raise RecordingError(
             f"no zenoh router at {router or 'tcp/localhost:7447'}: start one (ros2 run rmw_zenoh_cpp "
-            f"rmw_zenohd), or give the setting 'router' ({error})"
+            f"rmw_zenohd), or name another ({reason})"
         ) from error
 
 
