@@ -63,8 +63,8 @@ def with_faery(path: Path) -> Images:
 def with_eventcv(path: Path) -> Images:
     import eventcv
 
-    events = eventcv.load(str(path))
-    return cut(iter([(np.asarray(events.ts), np.asarray(events.xs), np.asarray(events.ys))]))
+    x, y, t, _ = eventcv.load(str(path)).numpy().T
+    return cut(iter([(t, x, y)]))
 
 
 def cut(parts: Iterator[tuple[Any, Any, Any]]) -> Images:
