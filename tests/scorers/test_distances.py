@@ -50,3 +50,8 @@ def test_images_that_cannot_be_compared_are_refused() -> None:
         sad(QUERIES.astype(np.float32), REFERENCES)
     with pytest.raises(InputError, match="arrays of numbers"):
         ncc(np.zeros((3, 0), np.uint8), np.zeros((3, 0), np.uint8))
+
+
+def test_the_sum_of_a_huge_image_fits() -> None:
+    """More than 32 bits hold."""
+    assert sad(np.zeros((1, 3, 1 << 22), np.uint8), np.full((1, 3, 1 << 22), 255, np.uint8)) == 255

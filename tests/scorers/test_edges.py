@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
+from evplace.scorers import edges
 from evplace.scorers.edges import Edges
 from evplace.testing import check_descriptor
 
@@ -83,3 +84,22 @@ def test_settings_that_cannot_be_are_refused() -> None:
     for wrong in ({"pixels": 0}, {"orientations": 1}, {"cell": 0}):
         with pytest.raises(SettingsError, match="settings of edges"):
             Edges(**wrong)
+
+
+@pytest.mark.parametrize("orientations", [2, 5, 6])
+def test_directions_are_shared_as_by_a_remainder(orientations: int) -> None:
+    """To the bit: sums take whole turns off as `mod` does."""
+    rng = np.random.default_rng(0)
+    at = rng.uniform(-orientations, orientations, (2, 9, 9)).astype(np.float32)
+    at[0, 0] = np.linspace(-orientations, orientations, 9)
+    half, turn = np.float32(orientations / 2), np.float32(orientations)
+    for bin_, found in enumerate(edges._shares(at, orientations).swapaxes(0, 1)):
+        away = np.abs(np.mod(at - np.float32(bin_) + half, turn) - half)
+        np.testing.assert_array_equal(found, np.maximum(1 - away, 0))
+
+
+def test_slopes_are_numpys() -> None:
+    values = np.random.default_rng(0).random((2, 5, 7)).astype(np.float32)
+    for axis in (1, 2):
+        np.testing.assert_array_equal(edges._slope(values, axis), np.gradient(values, axis=axis))
+    assert (edges._slope(values[:, :1], 1) == 0).all()

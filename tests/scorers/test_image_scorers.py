@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -84,3 +86,28 @@ def test_seqslam_compares_prepared_images(patch: int) -> None:
     np.testing.assert_allclose(rows_of(settings, references, queries), wanted, rtol=1e-5)
     with pytest.raises(SettingsError, match="patch of 0"):
         SeqSLAM(patch=1)
+
+
+@pytest.mark.parametrize("shape", [(30, 50), (30, 50, 3)])
+def test_ncc_is_blurred_and_reduced_by_two_matrices(shape: tuple[int, ...]) -> None:
+    rows, columns = reduction(30, 22, 2.0), reduction(50, 40, 2.0)
+    taken = images(3, shape)
+    small = np.einsum("ih,nhw...,jw->nij...", rows, taken.astype(np.float64), columns).reshape(3, -1)
+    small -= small.mean(axis=1, keepdims=True)
+    wanted = small / np.linalg.norm(small, axis=1, keepdims=True)
+    np.testing.assert_allclose(NCC().describe(taken), wanted, atol=2e-6)
+
+
+@pytest.mark.parametrize("scorer", [NCC(sigma=0), Cosine()])
+def test_a_map_opens_in_little_more_than_it_holds(scorer: object) -> None:
+    references = images(4000, (22, 40))
+    scorer_of(scorer).open({"references": references[:70]})
+    tracemalloc.start()
+    try:
+        opened = scorer_of(scorer).open({"references": references})
+        held, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert len(opened.rows(references[:1])[0]) == 4000
+    assert held >= 4 * 880 * 4000
+    assert peak < 1.5 * 4 * 880 * 4000

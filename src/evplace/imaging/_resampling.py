@@ -7,6 +7,7 @@ exact for binary images: integer sums and one division at the end.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -35,6 +36,7 @@ class AxisMap:
     """What the weights of every output sum to: divide by it."""
 
 
+@functools.lru_cache(maxsize=64)  # a frame at a time, it would take longer than the frame
 def axis_map(n_in: int, n_kept: int, n_out: int, blur: bool, resize: Resize) -> AxisMap:
     """Blur all `n_in` inputs, keep the first `n_kept`, resize them to `n_out`."""
     resized, total = _area(n_kept, n_out) if resize == "area" else _linear(n_kept, n_out)

@@ -98,7 +98,10 @@ class Matching(Protocol):
         """
 
     def path(self) -> Path:
-        """The answers for all rows so far, in hindsight where the method has any."""
+        """The answers for all rows so far, in hindsight where the method has any.
+
+        `step` may forget queries that lie far back, so that it runs for days: they are answered with -1.
+        """
 
 
 class Matcher(Protocol):

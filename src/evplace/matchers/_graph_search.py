@@ -223,14 +223,40 @@ def cost(score: float, distances: bool) -> float:
 
 @njit(cache=True)
 def trace(nodes: NDArray[Any], best: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The items and costs of the path that ends in node `best`, first query first."""
+    """The items and costs of the path that ends in node `best`; -1 and NaN of queries that are forgotten."""
     queries = nodes[best].query + 1
-    item, own = np.empty(queries, np.int64), np.empty(queries, np.float64)
+    item, own = np.full(queries, -1), np.full(queries, np.nan)
     n = best
-    for query in range(queries - 1, -1, -1):
+    while n > 0:
+        query = nodes[n].query
         item[query], own[query] = nodes[n].item, nodes[n].own
         n = nodes[n].parent
     return item, own
+
+
+@njit(cache=True)
+def forget(
+    oldest: int, grid: NDArray[np.int32], nodes: NDArray[Any], heap: NDArray[Any], state: NDArray[np.int64]
+) -> None:
+    """Drop nodes of queries before `oldest`, which nothing reaches any more; paths begin after them."""
+    now = np.zeros(state[NODES], np.int32)
+    kept = 1
+    for n in range(1, state[NODES]):
+        if nodes[n].query >= oldest:
+            now[n] = kept
+            nodes[kept] = nodes[n]
+            nodes[kept].parent = now[nodes[n].parent]
+            kept += 1
+    entries = state[ENTRIES]
+    state[NODES], state[BEST], state[ENTRIES] = kept, now[state[BEST]], 0
+    for i in range(entries):
+        acc, node = heap[i].acc, now[heap[i].node]
+        if node > 0:
+            _push(acc, node, heap, state)
+    for row in grid:
+        for item in range(len(row)):
+            if row[item] > 0:
+                row[item] = now[row[item]]
 
 
 @njit(cache=True)

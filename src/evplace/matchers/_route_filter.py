@@ -16,38 +16,45 @@ Belief = NDArray[np.float64]
 Floats = NDArray[np.float64]
 
 
+ONE = np.uint64(1)
+"""Unsigned, so that an index needs no look whether it counts from the end: half the time of `move`."""
+
+
 @njit(cache=True, nogil=True)
 def mix_speeds(belief: Belief, change: float, out: Belief) -> None:
     """Part of each class goes to its neighbours; its own transpose."""
     last = belief.shape[1] - 1
+    keep, half = 1 - change, 0.5 * change
     for r in range(belief.shape[0]):
-        for v in range(last + 1):
-            slower = belief[r, max(v - 1, 0)]
-            faster = belief[r, min(v + 1, last)]
-            out[r, v] = (1 - change) * belief[r, v] + 0.5 * change * (slower + faster)
+        b, to = belief[r], out[r]
+        to[0] = keep * b[0] + half * (b[0] + b[1])
+        for v in range(1, last):
+            to[v] = keep * b[v] + half * (b[v - 1] + b[v + 1])
+        to[last] = keep * b[last] + half * (b[last - 1] + b[last])
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy")
 def move(belief: Belief, way: Floats, steps: Floats, out: Belief) -> None:
     """Each class v moves on by steps[v] along the way (references,); what passes the end is lost.
 
-    Between two references it is shared by nearness.
+    Between two references it is shared by nearness. All classes go along the way together: one pass.
     """
-    n = len(way)
+    last = np.uint64(len(way) - 1)
+    at = np.zeros(len(steps), np.uint64)
     out[:] = 0.0
-    for v in range(len(steps)):
-        at = 0
-        for r in range(n):
-            goal = way[r] + steps[v]
-            while at < n - 1 and way[at + 1] <= goal:
-                at += 1
-            if at == n - 1:
-                if goal <= way[at]:
-                    out[at, v] += belief[r, v]
+    for r in range(len(way)):
+        for v in range(len(steps)):
+            goal, here = way[r] + steps[v], at[v]
+            while here < last and way[here + ONE] <= goal:
+                here += ONE
+            at[v] = here
+            if here == last:
+                if goal <= way[here]:
+                    out[here, v] += belief[r, v]
                 continue
-            share = (goal - way[at]) / (way[at + 1] - way[at])
-            out[at, v] += (1 - share) * belief[r, v]
-            out[at + 1, v] += share * belief[r, v]
+            share = (goal - way[here]) / (way[here + ONE] - way[here])
+            out[here, v] += (1 - share) * belief[r, v]
+            out[here + ONE, v] += share * belief[r, v]
 
 
 @njit(cache=True, nogil=True)
@@ -72,14 +79,20 @@ def pass_links(
     belief: Belief, first: NDArray[np.int64], to: NDArray[np.int64], share: float, out: Belief
 ) -> None:
     """A share of each linked reference's belief goes to its links, equally."""
+    speeds = belief.shape[1]
+    part = np.empty(speeds)
     out[:] = belief
     for r in range(belief.shape[0]):
         many = first[r + 1] - first[r]
+        if many == 0:
+            continue
+        for v in range(speeds):
+            part[v] = share * belief[r, v] / many
         for k in range(first[r], first[r + 1]):
-            for v in range(belief.shape[1]):
-                part = share * belief[r, v] / many
-                out[r, v] -= part
-                out[to[k], v] += part
+            there = out[to[k]]
+            for v in range(speeds):
+                out[r, v] -= part[v]
+                there[v] += part[v]
 
 
 @njit(cache=True, nogil=True)
@@ -94,6 +107,35 @@ def pass_links_back(
             for k in range(first[r], first[r + 1]):
                 there += later[to[k], v] / many
             out[r, v] = later[r, v] if many == 0 else (1 - share) * later[r, v] + share * there
+
+
+@njit(cache=True, nogil=True)
+def level(belief: Belief, share: float, more: float) -> None:
+    """A share of the belief stays, and every class of every reference gets some more."""
+    for r in range(belief.shape[0]):
+        for v in range(belief.shape[1]):
+            belief[r, v] = belief[r, v] * share + more
+
+
+@njit(cache=True, nogil=True)
+def weigh(belief: Belief, evidence: Floats, cell: NDArray[np.int32], says: Floats, factors: Floats) -> None:
+    """What each reference's cell (references,) of a table says is added to its evidence and counts."""
+    for r in range(belief.shape[0]):
+        evidence[r] += says[cell[r]]
+        factor = factors[cell[r]]
+        for v in range(belief.shape[1]):
+            belief[r, v] *= factor
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def share_out(belief: Belief, total: float, out: Floats) -> None:
+    """Divide the belief by its total; `out` gets that of each reference, its eight classes in pairs."""
+    flat = belief.reshape(-1)
+    for i in range(flat.size):
+        flat[i] /= total
+    for r in range(belief.shape[0]):
+        b = belief[r]
+        out[r] = ((b[0] + b[1]) + (b[2] + b[3])) + ((b[4] + b[5]) + (b[6] + b[7]))
 
 
 @njit(cache=True, nogil=True)
@@ -125,19 +167,22 @@ def read(belief: Floats, z: NDArray[np.float32], way: Floats, xy: Floats, reach:
         if abs(way[r] - centre) < abs(way[item] - centre):
             item = r
     out[0] = most
-    out[1], out[2], top = -1e9, -1e9, 0
+    beside, elsewhere, top = -1e9, -1e9, 0
     for r in range(n):
         if z[r] > z[top]:
             top = r
-        along, east, north = abs(way[r] - way[item]), xy[r, 0] - xy[item, 0], xy[r, 1] - xy[item, 1]
-        apart = min(along, (east * east + north * north) ** 0.5)
-        if along < reach[1] and z[r] > out[1]:
-            out[1] = z[r]
-        if apart > reach[3] and z[r] > out[2]:
-            out[2] = z[r]
-    east, north = xy[top, 0] - xy[item, 0], xy[top, 1] - xy[item, 1]
-    agrees = min(abs(way[top] - way[item]), (east * east + north * north) ** 0.5) < reach[2]
-    out[3] = 1.0 if agrees else 0.0
-    if out[2] < -1e8:  # the whole map is one place
-        out[2] = -4.0
+        if z[r] > beside and abs(way[r] - way[item]) < reach[1]:
+            beside = z[r]
+        if z[r] > elsewhere and _apart(way, xy, r, item) > reach[3]:
+            elsewhere = z[r]
+    out[1] = beside
+    out[2] = elsewhere if elsewhere >= -1e8 else -4.0  # the whole map is one place
+    out[3] = 1.0 if _apart(way, xy, top, item) < reach[2] else 0.0
     return item
+
+
+@njit(cache=True, nogil=True)
+def _apart(way: Floats, xy: Floats, one: int, other: int) -> float:
+    """Metres between two references, along the way or as the crow flies: whichever is shorter."""
+    east, north = xy[one, 0] - xy[other, 0], xy[one, 1] - xy[other, 1]
+    return float(min(abs(way[one] - way[other]), np.sqrt(east * east + north * north)))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import ScoresError
 from evplace.matchers import Path, Rows
+from evplace.matchers._kept import LIVE_ANSWERS, after
 
 
 class Columns:
@@ -17,17 +18,28 @@ class Columns:
 
     def __init__(self, codes: str) -> None:
         self._columns = [array(code) for code in codes]
+        self.first = 0
+        """The first query whose values are still here."""
 
     def __len__(self) -> int:
-        return len(self._columns[0])
+        """Queries so far, forgotten ones too."""
+        return self.first + len(self._columns[0])
 
     def extend(self, *values: NDArray[Any]) -> None:
         """Add to each column the values of the next queries, an array (queries,) each."""
         for column, value in zip(self._columns, values, strict=True):
             column.frombytes(value.astype(np.dtype(column.typecode), copy=False).tobytes())
 
+    def forget_old(self) -> None:
+        """For a live drive: forget all but the last queries, so that the table does not grow."""
+        old = len(self._columns[0]) - LIVE_ANSWERS
+        if old >= LIVE_ANSWERS:
+            for column in self._columns:
+                del column[:old]
+            self.first += old
+
     def arrays(self) -> list[NDArray[Any]]:
-        """The columns, copied."""
+        """The columns, copied, from the query `first`."""
         return [np.array(column, np.dtype(column.typecode)) for column in self._columns]
 
 
@@ -38,9 +50,9 @@ class Answers(Columns):
         super().__init__("qdb")
 
     def path(self) -> Path:
-        """All answers, copied."""
+        """All answers, copied; -1 for those that are forgotten."""
         item, score, accepted = self.arrays()
-        return Path(item, score, accepted.astype(np.bool_))
+        return after(self.first, Path(item, score, accepted.astype(np.bool_)))
 
 
 class RowCheck:

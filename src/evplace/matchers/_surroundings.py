@@ -54,7 +54,7 @@ def evidence(wrong: Floats) -> Floats:
     return np.asarray(np.log((1 - OUTLIERS) * np.exp(np.minimum(ratio, 40.0)) + OUTLIERS), np.float64)
 
 
-def looked_up(table: Floats, z: NDArray[np.float32]) -> Floats:
-    """(items,) the table over GRID at z-scores: of the nearest one."""
+def cells(z: NDArray[np.float32]) -> NDArray[np.int32]:
+    """(items,) where in GRID z-scores are: the nearest one."""
     at = np.clip((z - np.float32(GRID[0])) * np.float32(1 / STEP) + np.float32(0.5), 0, len(GRID) - 1)
-    return np.asarray(table[at.astype(np.int32)], np.float64)
+    return np.asarray(at, np.int32)

@@ -95,7 +95,7 @@ def _moments(
     """The moments of some numbers, from the belief before them."""
     filter_, out = Filter(ways, wrong), []
     if start is not None:
-        filter_.belief = start
+        filter_.belief = start.copy()
     for number in numbers:
         if number:
             filter_.move(drive.driven_s[number])

@@ -9,6 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from evplace.matchers._kept import Kept
+
 JUMP = np.iinfo(np.int16).min
 """A step that stands for a jump from the best item of the query before."""
 
@@ -27,8 +29,7 @@ class Viterbi:
     def __init__(self, low: int, gains: NDArray[np.float64], jump: float = -np.inf) -> None:
         self._rule = (low, gains, jump)
         self._sums: NDArray[np.float64] = np.empty(0)
-        self._steps: list[NDArray[np.int16]] = []
-        self._tops: list[NDArray[np.int64]] = []
+        self._steps, self._tops = Kept(), Kept()
 
     def extend(self, gains: NDArray[np.float64]) -> NDArray[np.int64]:
         """Take the next queries' gains (queries, items); for each the end of the best path so far."""
@@ -41,16 +42,18 @@ class Viterbi:
         return ends
 
     def trace(self) -> NDArray[np.int64]:
-        """The best path's item for each query so far, the lowest end among equals."""
-        item = np.empty(sum(map(len, self._tops)), np.int64)
-        at = int(self._sums.argmax()) if len(item) else 0
-        query = len(item)
-        for steps, tops in zip(reversed(self._steps), reversed(self._tops), strict=True):
-            for i in range(len(tops) - 1, -1, -1):
-                query -= 1
-                item[query] = at
-                at = int(tops[i] if steps[i, at] == JUMP else at - steps[i, at])
-        return item
+        """The best path's item for each query that is kept, the lowest end among equals."""
+        items: list[int] = []
+        at = int(self._sums.argmax()) if len(self._steps) else 0
+        for steps, top in zip(self._steps.backwards(), self._tops.backwards(), strict=True):
+            items.append(at)
+            at = int(top if steps[at] == JUMP else at - steps[at])
+        return np.array(items[::-1], np.int64)
+
+    def forget_but(self, many: int) -> None:
+        """Forget all but the last `many` queries: `trace` goes back no further."""
+        self._steps.forget_but(many)
+        self._tops.forget_but(many)
 
 
 def pieces(table: NDArray[Any], rows: int = 256) -> Iterator[NDArray[Any]]:

@@ -40,7 +40,8 @@ from evplace.matchers import (
 from evplace.matchers._answering import Found, Reader
 from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
 from evplace.matchers._calibration import LATE, LIVE, checked, measured
-from evplace.matchers._known import Means, joined, means_ahead, of_drive, probability
+from evplace.matchers._kept import Kept, after, live_rows
+from evplace.matchers._known import Means, joined, means_ahead, of_drive, probability, threshold
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
 from evplace.matchers._ways import Ways
@@ -104,7 +105,9 @@ class Bayes:
         if self.threshold is not None:
             return self.threshold
         unknown = (route.learned or {}).get(kind)
-        return -1.0 if unknown is None else max(float(np.quantile(unknown, 1 - self.false_accept)), LEAST)
+        if unknown is None:
+            return -1.0
+        return max(threshold(unknown, self.false_accept, late=kind == LATE), LEAST)
 
 
 Bayes.presets = {"best": Bayes()}
@@ -229,7 +232,7 @@ class _OnRows:
 
     def __init__(self, settings: Bayes) -> None:
         self._settings, self._check = settings, RowCheck()
-        self._rows: list[Rows] = []
+        self._rows = Kept()
         self._following: Following | None = None
 
     def step(self, row: Row) -> Answer | None:
@@ -238,6 +241,7 @@ class _OnRows:
         if self._following is None:
             self._following = self._settings.follow(_nowhere(len(row)))
         self._rows.append(row[None])
+        self._rows.forget_but(live_rows(row.nbytes))
         answers = self._following.step(row, _on_time(self._check.queries - 1))
         return answers[0] if answers else None
 
@@ -249,9 +253,9 @@ class _OnRows:
         """See Matching."""
         if not self._check.queries:
             return Path.of([])
-        rows = np.concatenate(self._rows)
-        seen = [_on_time(query) for query in range(len(rows))]
-        return self._settings.in_hindsight(_nowhere(rows.shape[1]), rows, seen)
+        rows, first = self._rows.table(), self._rows.first
+        seen = [_on_time(query) for query in range(first, len(self._rows))]
+        return after(first, self._settings.in_hindsight(_nowhere(rows.shape[1]), rows, seen))
 
 
 def _nowhere(items: int) -> Route:

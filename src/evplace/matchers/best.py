@@ -45,6 +45,7 @@ class _BestMatching:
     def step(self, row: Row) -> Answer:
         """The best item of this query; `row` (items,)."""
         item, score, accepted = self._match(row[None])
+        self._answers.forget_old()
         return Answer(len(self._answers) - 1, int(item[0]), float(score[0]), bool(accepted[0]))
 
     def extend(self, rows: Rows) -> None:

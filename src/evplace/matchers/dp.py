@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from evplace.core.errors import SettingsError
 from evplace.matchers import Answer, Matching, Path, Row, Rows, Sweep
 from evplace.matchers._graph_search import IMPOSSIBLE
+from evplace.matchers._kept import Kept, after, live_rows
 from evplace.matchers._rows import RowCheck, as_table, costs_below
 from evplace.matchers._viterbi import LONGEST_STEP, Viterbi, pieces
 
@@ -59,9 +60,9 @@ DP.presets = {"ism": DP(m=6.0, window="half_open")}
 
 
 class _FullSearch:
-    """Remembers the scores and a step for each cell, 6 or 10 bytes: a method for drives, not for days.
+    """Remembers the scores and a step for each cell, 6 or 10 bytes; live, those of the last rows.
 
-    `step` answers with the end of the best path so far, `path` with the whole of it.
+    `step` answers with the end of the best path so far, `path` with all of it that is kept.
     """
 
     def __init__(self, settings: DP, distances: bool = False) -> None:
@@ -69,12 +70,16 @@ class _FullSearch:
         self._m = np.inf if settings.m is None and distances else 3.7 if settings.m is None else settings.m
         steps = 2 * settings.K + (settings.window == "inclusive")
         self._search = Viterbi(-settings.K, np.zeros(steps))
-        self._rows: list[NDArray[np.floating[Any]]] = []
+        self._rows = Kept()
 
     def step(self, row: Row) -> Answer:
         """Where this query is, by the best path so far; `row` (items,)."""
         item = int(self._advance(row[None])[0])
-        own = float(costs(self._rows[-1][0, item], self._distances))
+        row = self._rows.last
+        own = float(costs(row[item], self._distances))
+        many = live_rows(row.nbytes + 2 * len(row))
+        self._rows.forget_but(many)
+        self._search.forget_but(many)
         return Answer(self._check.queries - 1, item, -own, own < self._m)
 
     def extend(self, rows: Rows) -> None:
@@ -85,9 +90,9 @@ class _FullSearch:
     def path(self) -> Path:
         """The best path so far, one reference a query; not accepted are those that cost m or more."""
         item = self._search.trace()
-        scores = [row[at] for row, at in zip((r for rows in self._rows for r in rows), item, strict=True)]
+        scores = [row[at] for row, at in zip(self._rows.rows(), item, strict=True)]
         own = costs(np.array(scores), self._distances)
-        return Path(item, -own, own < self._m)
+        return after(self._rows.first, Path(item, -own, own < self._m))
 
     def _advance(self, rows: Rows) -> NDArray[np.int64]:
         table = self._check(rows)

@@ -44,7 +44,8 @@ class Graph:
     the query's own number (isl; it takes both drives to be aligned), at those with "high" scores
     (the upper 30 % of the row's range), or start with all and never look again, "none" (opr)."""
     memory: int = 1000
-    """Score rows kept, for branches that lag behind the best path; older ones are given up. 0 keeps all."""
+    """Score rows kept, for branches that lag behind the best path; older ones are given up. 0 keeps all: for
+    drives, not for days."""
 
     def __post_init__(self) -> None:
         """Raise SettingsError for values out of range."""
@@ -77,7 +78,7 @@ Graph.presets = {
 
 
 class _LazySearch:
-    """Remembers the searched part of the graph and the last rows.
+    """Remembers the searched part of the graph, live that of the last `memory` rows, and these rows.
 
     `step` answers with the end of the best path so far, `path` with the whole of it, which may differ from
     what `step` said. The score is the node's cost, negated.
@@ -100,7 +101,7 @@ class _LazySearch:
 
     def step(self, row: Row) -> Answer:
         """Where this query is, by the best path so far; `row` (items,)."""
-        self.extend(row[None])
+        self._take(row[None], live=True)
         node = self._nodes[self._state[search.BEST]]
         return Answer(
             int(node["query"]), int(node["item"]), -float(node["own"]), bool(node["own"] <= self._m)
@@ -108,13 +109,16 @@ class _LazySearch:
 
     def extend(self, rows: Rows) -> None:
         """Take the next queries; `rows` (queries, items)."""
+        self._take(rows, live=False)
+
+    def _take(self, rows: Rows, live: bool) -> None:
         table = self._check(rows)
         if self._distances and (table > 0).any():
             raise ScoresError("a distance is negative: the graph takes distances from 0, or similarities")
         offered = np.empty(0, np.int64)
         done = 0
         while done < len(table):
-            self._make_room(table[done:])
+            self._make_room(table[done:], live)
             done += search.advance(
                 table[done:],
                 offered,
@@ -133,7 +137,7 @@ class _LazySearch:
         item, own = search.trace(self._nodes, int(self._state[search.BEST]))
         return Path(item, -own, own <= self._m)
 
-    def _make_room(self, rows: NDArray[np.floating[Any]]) -> None:
+    def _make_room(self, rows: NDArray[np.floating[Any]], live: bool) -> None:
         """Rings for `memory` rows, or for all; nodes for at least one more query."""
         queries, items = int(self._state[search.QUERIES]), rows.shape[1]
         wanted = self._memory or queries + len(rows)
@@ -143,7 +147,11 @@ class _LazySearch:
             if queries:
                 scores[:queries], grid[:queries] = self._scores[:queries], self._grid[:queries]
             self._scores, self._grid = scores, grid
-        needed = int(self._state[search.NODES]) + items + 2 * self._rules[0] + 1
+        more = items + 2 * self._rules[0] + 1
+        needed = int(self._state[search.NODES]) + more
+        if needed > len(self._nodes) and live and self._memory:
+            search.forget(queries - self._memory, self._grid, self._nodes, self._heap, self._state)
+            needed = 2 * (int(self._state[search.NODES]) + more)  # or it would soon be full again
         if needed > len(self._nodes):
             self._nodes = _grown(self._nodes, max(needed, 2 * len(self._nodes)))
             self._heap = _grown(self._heap, len(self._nodes))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
 from evplace.matchers import Answer, Matching, Path, Row, Rows, Sweep
+from evplace.matchers._kept import Kept, after, live_rows
 from evplace.matchers._rows import RowCheck, above, as_table
 from evplace.matchers._seqslam_search import enhance
 from evplace.matchers._viterbi import LONGEST_STEP, Viterbi, pieces
@@ -79,7 +80,7 @@ class HMM:
 
 
 class _Model:
-    """Remembers the log-probabilities and a step for each cell, 6 bytes.
+    """Remembers the log-probabilities and a step for each cell, 6 bytes; live, those of the last rows.
 
     `step` answers by the rows so far, `path` by all of them, on the matrix of reduced rank. The score is the
     log of how much likelier the matched references are than chance, in `path` averaged over `length` queries.
@@ -88,13 +89,16 @@ class _Model:
     def __init__(self, settings: HMM) -> None:
         self._settings, self._check = settings, RowCheck()
         self._search: Viterbi | None = None
-        self._rows: list[NDArray[np.float32]] = []
+        self._rows = Kept()
 
     def step(self, row: Row) -> Answer:
         """The likeliest reference of this query, given all rows so far; `row` (items,)."""
-        item = int(self._advance(row[None])[0])
-        score = float(self._rows[-1][0, item])
-        return Answer(self._check.queries - 1, item, score, score > self._settings.threshold)
+        search, item = self._advance(row[None])
+        score = float(self._rows.last[item[0]])
+        many = live_rows(6 * len(self._rows.last))
+        self._rows.forget_but(many)
+        search.forget_but(many)
+        return Answer(self._check.queries - 1, int(item[0]), score, score > self._settings.threshold)
 
     def extend(self, rows: Rows) -> None:
         """Take the next queries; `rows` (queries, items)."""
@@ -105,23 +109,31 @@ class _Model:
         """The likeliest path through all queries so far."""
         if self._search is None:
             return Path.of([])
-        logs, search = np.concatenate(self._rows), self._search
+        rows, search = self._rows, self._search
         if self._settings.drop:
-            logs = without_leading(logs, self._settings.drop)
-            search = transitions(self._settings, logs.shape[1])
-            for piece in pieces(logs):
-                search.extend(piece.astype(np.float64))
+            rows, search = self._reduced()
         item = search.trace()
-        score = moving_mean(logs[np.arange(len(item)), item].astype(np.float64), self._settings.length)
-        return Path(item, score, score > self._settings.threshold)
+        own = np.array([row[at] for row, at in zip(rows.rows(), item, strict=True)], np.float64)
+        score = moving_mean(own, self._settings.length)
+        return after(self._rows.first, Path(item, score, score > self._settings.threshold))
 
-    def _advance(self, rows: Rows) -> NDArray[np.int64]:
+    def _reduced(self) -> tuple[Kept, Viterbi]:
+        """What is kept, of reduced rank, and the search through it."""
+        logs, rows = without_leading(self._rows.table(), self._settings.drop), Kept()
+        search = transitions(self._settings, logs.shape[1])
+        rows.append(logs)
+        for piece in pieces(logs):
+            search.extend(piece.astype(np.float64))
+        return rows, search
+
+    def _advance(self, rows: Rows) -> tuple[Viterbi, NDArray[np.int64]]:
+        """The search, and the end of the best path at each query."""
         table = self._check(rows)
         if self._search is None:
             self._search = transitions(self._settings, table.shape[1])
         logs = log_odds(table, self._settings)
         self._rows.append(logs)
-        return self._search.extend(logs.astype(np.float64))
+        return self._search, self._search.extend(logs.astype(np.float64))
 
 
 def transitions(settings: HMM, items: int) -> Viterbi:

@@ -76,6 +76,7 @@ class _LocalMatching:
     def step(self, row: Row) -> Answer:
         """The match of this query, or item -1 and the best score that was too low; `row` (items,)."""
         item, score, accepted = self._match(row[None])
+        self._answers.forget_old()
         return Answer(len(self._answers) - 1, int(item[0]), float(score[0]), bool(accepted[0]))
 
     def extend(self, rows: Rows) -> None:

@@ -117,6 +117,7 @@ class _SequenceSearch:
         if not len(item):
             return None
         score, accepted = self._judge(best, second, least)
+        self._found.forget_old()
         query = self._before + len(self._found) - 1
         return Answer(query, int(item[0]), float(score[0]), bool(accepted[0]))
 
@@ -130,7 +131,8 @@ class _SequenceSearch:
         score, accepted = self._judge(best, second, self._state[1])
         queries = self._check.queries
         path = Path(np.full(queries, -1), np.full(queries, np.nan), np.zeros(queries, np.bool_))
-        middle = slice(self._before, self._before + len(item))
+        first = self._before + self._found.first
+        middle = slice(first, first + len(item))
         path.item[middle], path.score[middle], path.accepted[middle] = item, score, accepted
         return path
 

@@ -29,6 +29,8 @@ Content = Mapping[str, NDArray[Any] | bytes]
 """What learning leaves behind: arrays by their names, and files by their names with a suffix."""
 REFERENCES = "references"
 """The content of a map whose items are images: (items, h, w) or (items, h, w, C) uint8."""
+BLOCK = 64
+"""Images that are described at once."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ class _DescribedRows:
 
     def __init__(self, descriptor: Descriptor, references: NDArray[np.uint8]) -> None:
         self._descriptor = descriptor
-        self._search = Exact(self._vectors(references))
+        self._search = Exact(in_blocks(self._vectors, references))
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         return self._search.rows(self._vectors(images))
@@ -110,6 +112,16 @@ class _DescribedRows:
                 f"({len(images)}, dimensions) for {len(images)} images, it gave {_kind_of(vectors)}"
             )
         return vectors
+
+
+def in_blocks(vectors_of: Callable[[NDArray[np.uint8]], Vectors], images: NDArray[np.uint8]) -> Vectors:
+    """(n, dimensions) of many images, BLOCK at a time: hardly more memory is needed than is kept."""
+    first = vectors_of(images[:BLOCK])
+    vectors = np.empty((len(images), *first.shape[1:]), first.dtype)
+    vectors[:BLOCK] = first
+    for start in range(BLOCK, len(images), BLOCK):
+        vectors[start : start + BLOCK] = vectors_of(images[start : start + BLOCK])
+    return vectors
 
 
 def scorer_of(part: Scorer | Descriptor) -> Scorer:

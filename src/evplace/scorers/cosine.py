@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from evplace.imaging.traverse import Traverse
 from evplace.places import Places
-from evplace.scorers import Content, Learned, Learning, Rows, keep_images, references_of
+from evplace.scorers import Content, Learned, Learning, Rows, in_blocks, keep_images, references_of
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class CosineRows:
 
     def __init__(self, references: NDArray[np.uint8]) -> None:
         """From reference images (items, h, w) or (items, h, w, C)."""
-        self._references = _unit(references)
+        self._references = in_blocks(_unit, references)
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         """See OpenScorer."""

@@ -39,11 +39,12 @@ class NCC:
         height, width = images.shape[1:3]
         rows = reduction(height, min(height, self.height), self.sigma)
         columns = reduction(width, min(width, self.width), self.sigma)
-        values = images.astype(np.float32)
+        channels = np.moveaxis(images.reshape(*images.shape[:3], -1), 3, 1)
+        values = np.ascontiguousarray(channels, np.float32)
         if self.log:
             values = np.log1p(values)
-        small = np.einsum("ih,nhw...,jw->nij...", rows, values, columns, optimize=True)
-        flat = np.asarray(small, np.float32).reshape(len(small), -1)
+        small = np.moveaxis(rows @ values @ columns.T, 1, 3)
+        flat = small.reshape(len(small), -1)
         flat -= flat.mean(axis=1, keepdims=True)
         length = np.linalg.norm(flat, axis=1, keepdims=True)
         unit: NDArray[np.float32] = np.divide(flat, length, out=np.zeros_like(flat), where=length > FLAT)
