@@ -27,6 +27,8 @@ from numpy.typing import NDArray
 from bench_images import small
 from bench_readers import MAKERS, RATE, generated
 from evplace.core.events import Events, Size
+from evplace.drives._recorded import RecordedImages, StorePlace
+from evplace.imaging.recipe import Recipe
 from evplace.imaging.stream import EventImages, images_of
 from evplace.sources.readers import open_recording
 from harness import alternate, processor, report
@@ -48,6 +50,14 @@ def stored(path: Path) -> Images:
     return [made.image for made in images_of(recording.packets(), EventImages(recording.size))]
 
 
+def from_store(path: Path) -> Images:
+    """From the event store, which the first call writes."""
+    recording = open_recording(path)
+    recipe = Recipe(kind="events", size=recording.size)
+    place = StorePlace(path.with_suffix(".store"), True, {})
+    return [made.image for made in RecordedImages(recording, recipe, None, place)]
+
+
 def by_command_line(path: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "evplace", "images", str(path), "-o", f"{folder}/out"]
@@ -63,8 +73,8 @@ def with_faery(path: Path) -> Images:
 def with_eventcv(path: Path) -> Images:
     import eventcv
 
-    events = eventcv.load(str(path))
-    return cut(iter([(np.asarray(events.ts), np.asarray(events.xs), np.asarray(events.ys))]))
+    x, y, t, _ = eventcv.load(str(path)).numpy().T
+    return cut(iter([(t, x, y)]))
 
 
 def cut(parts: Iterator[tuple[Any, Any, Any]]) -> Images:
@@ -119,12 +129,13 @@ def main() -> None:
         with tempfile.TemporaryDirectory(prefix="evplace-bench-") as folder:
             path = MAKERS[name](Path(folder), events)
             peers = {"faery + numpy + OpenCV": with_faery, "eventcv + numpy + OpenCV": with_eventcv}
-            work = check({"ours": ours, "ours, by way of arrays": stored} | peers, path)
+            own = {"ours": ours, "ours, by way of arrays": stored, "ours, from the store": from_store}
+            work = check(own | peers, path)
             jobs: dict[str, Callable[[], object]] = {one: partial(make, path) for one, make in work.items()}
             jobs["ours, command line"] = partial(by_command_line, path)
             timings = alternate(jobs, arguments.rounds)
             report(f"{name}: {len(events):,} events, {arguments.seconds} s of recording", timings)
-            for one in ("ours", "ours, command line"):
+            for one in ("ours", "ours, from the store", "ours, command line"):
                 print(f"  {one}: {arguments.seconds / timings[one].median:.1f} x real time")
 
 

@@ -29,8 +29,8 @@ ORDER = {
     "evplace.core": "errors events grey zscores settings families storage workers drawing",
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",
     "evplace.imaging": (
-        "windows _resampling representations tones images activity averaging recipe stream spacing traverse "
-        "sheets"
+        "windows _resampling representations tones images activity averaging recipe stream store spacing "
+        "traverse sheets"
     ),
     "evplace.drives": "datasets to_traverse",
     "evplace.scorers": "_search _reduction _compressed _distances _seqslam_images _network",

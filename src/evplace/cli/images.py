@@ -6,6 +6,8 @@ Examples:
   evplace images night.aedat4 -o night --dt 1/60 --sheet night.png
   evplace images night.aedat4 -o night --mask-hot --flicker-hz 100
   evplace images night.aedat4 -o night --mask night_hot_pixels.txt
+  evplace images night.aedat4 -o night --store       and then, without decoding again:
+  evplace images night.aedat4 -o fine --dt 1/60
   evplace images day.aedat4 -o day --track day.nmea --every-m 2      an image every two metres
   evplace images frames/ -o day --crop-bottom 0 --width 80 --height 80
   evplace images film.mp4 -o day                     events are simulated; --kind frames keeps the colours
@@ -26,6 +28,7 @@ from evplace.cli._recording import RecordingFlags
 from evplace.cli._settings import a_part_of
 from evplace.cli._track import TrackFlags
 from evplace.core.storage import check_new_file
+from evplace.drives._recorded import StorePlace
 from evplace.drives.datasets import Drive
 from evplace.drives.to_traverse import open_source, record
 from evplace.imaging.images import ImageSettings
@@ -66,6 +69,9 @@ class Args(TrackFlags, RecordingFlags):
     spacing: Annotated[SpacingSettings, tyro.conf.arg(name="")] = field(default_factory=SpacingSettings)
     mask: Path | None = None
     """Pixels to leave out: a text file of x,y lines, or a .npy file (a mask.npy of a traverse will do)."""
+    store: bool = False
+    """Also keep where events fell, beside the traverse, in SOURCE.store: other images of this recording (dt a
+    multiple of 1/240 s, blur, crop, size) are then made of that, without decoding. It is used by itself."""
     yes: bool = False
     """Write the images even where they come to more than 1 GB."""
     overwrite: bool = False
@@ -103,6 +109,7 @@ def run(args: Args) -> int:
         "dropped": traverse.info.get("dropped", {}),
         "masked_pixels": int(traverse.mask.sum()) if traverse.mask is not None else 0,
         "cleaned": traverse.info.get("cleaned", {}),
+        "made_of_store": traverse.info.get("store"),
         "fault": fault,
     }
     if args.json:
@@ -122,8 +129,15 @@ def _record(args: Args, writer: TraverseWriter) -> str | None:
     drive = _source(args)
     with remarks():
         return record(
-            drive, writer, args.opened_track(), None, args.spacing, args.mask, **_named(args)
+            drive, writer, args.opened_track(), None, args.spacing, args.mask, _store(args), **_named(args)
         )  # fmt: skip
+
+
+def _store(args: Args) -> StorePlace:
+    """Beside the traverse, by the recording's name."""
+    name = args.source.resolve().name if args.drive is None else f"{args.source.resolve().name}-{args.drive}"
+    reading = {"time_unit": args.time_unit, "stream": args.stream, "columns": args.columns}
+    return StorePlace(args.out.with_name(f"{name}.store"), args.store, reading)
 
 
 def _named(args: Args) -> dict[str, Any]:

@@ -24,15 +24,12 @@ class Check:
     def __init__(self, subject: Subject) -> None:
         shape = (subject.size[1], subject.size[0])
         self._subject = subject
-        self._last_us = np.full(shape, np.iinfo(np.int64).min // 2)
-        self._last_p = np.zeros(shape, np.bool_)
+        self._last = np.full(shape, np.iinfo(np.int64).min // 2)
         self._twice = self._soon = 0
 
     def see(self, events: Events) -> None:
         """Count repeats among the next events."""
-        twice, soon = _repeats(
-            events.t_us, events.x, events.y, events.p, SOON_US, self._last_us, self._last_p
-        )
+        twice, soon = _repeats(events.t_us, events.x, events.y, events.p, SOON_US, self._last)
         self._twice += twice
         self._soon += soon
 
@@ -69,17 +66,20 @@ def _repeats(
     y: NDArray[np.uint16],
     p: NDArray[np.bool_],
     soon_us: int,
-    last_us: NDArray[np.int64],
-    last_p: NDArray[np.bool_],
+    last: NDArray[np.int64],
 ) -> tuple[int, int]:
-    """How many equal their pixel's last event, and how many others come within `soon_us` of it."""
+    """How many equal their pixel's last event, and how many others come within `soon_us` of it.
+
+    `last` (H, W) is each pixel's last time, doubled, and one more where it became brighter: what is far apart
+    in memory costs more than all else.
+    """
     twice, soon = 0, 0
     for i in range(len(t_us)):
-        since = t_us[i] - last_us[y[i], x[i]]
-        if since == 0 and p[i] == last_p[y[i], x[i]]:
+        now = t_us[i] << 1 | np.int64(p[i])
+        before = last[y[i], x[i]]
+        last[y[i], x[i]] = now
+        if now == before:
             twice += 1
-        elif since < soon_us:
+        elif t_us[i] - (before >> 1) < soon_us:
             soon += 1
-        last_us[y[i], x[i]] = t_us[i]
-        last_p[y[i], x[i]] = p[i]
     return twice, soon

@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,24 +20,22 @@ from evplace.core.errors import (
     TraverseError,
     UnsupportedError,
 )
-from evplace.core.events import Events, Size
+from evplace.core.events import Size
 from evplace.core.settings import make, to_dict
 from evplace.drives import datasets
+from evplace.drives._recorded import GoodPart, RecordedImages, StorePlace
 from evplace.drives.datasets import Drive
 from evplace.imaging.images import Imager, frame_image
 from evplace.imaging.recipe import OF_EVENTS, Kind, Recipe, shown
 from evplace.imaging.spacing import Spacer, SpacingSettings
-from evplace.imaging.stream import EventImages, images_of
 from evplace.imaging.traverse import MARK, Traverse, TraverseWriter
-from evplace.sources.cleaning import CleaningSettings, MaskSource, pixel_mask
+from evplace.sources.cleaning import CleaningSettings, MaskSource
 from evplace.sources.film import VIDEOS, Film, film_of, is_video, open_film
 from evplace.sources.frames import is_frames, open_frames
-from evplace.sources.readers import Canvas, Recording, is_recording, open_recording
+from evplace.sources.readers import Recording, is_recording, open_recording
 from evplace.sources.simulators.recording import SimulatedRecording
 from evplace.sources.tracks import Track, open_track
 from evplace.sources.tracks._apart import apart, on_day_of
-
-T = TypeVar("T")
 
 FAST = 5_000_000
 """Bytes of images a second of the drive from which on their number is foretold."""
@@ -93,7 +91,7 @@ def open_traverse(
     with tempfile.TemporaryDirectory(prefix="evplace-") as folder:
         writer = TraverseWriter(Path(folder), {})
         try:
-            record(source, writer, track, recipe, spacing, mask, **settings)
+            record(source, writer, track, recipe, spacing, mask, None, **settings)
             writer.close()
         finally:
             writer.discard()
@@ -148,11 +146,13 @@ def record(
     recipe: Recipe | None = None,
     spacing: SpacingSettings | None = None,
     mask: MaskSource | None = None,
+    store: StorePlace | None = None,
     **settings: object,
 ) -> str | None:
     """Write the images of a drive; what is not given is the drive's own. Returns what broke off, if any.
 
-    `recipe` and `settings` as in `open_traverse`. SettingsError where `settings` name what means nothing for
+    `recipe` and `settings` as in `open_traverse`; a recording's event `store` is used, and written where that
+    is asked for. SettingsError where `settings` name what means nothing for
     the drive; TraverseError where the recipe is of another sensor.
     """
     asked = (recipe or drive.recipe).changed(**settings)
@@ -163,7 +163,7 @@ def record(
     if isinstance(source, Film):
         check_uncleaned(source.path, asked, mask)
         return _record_frames(source, writer, asked, positions, spacing)
-    return _record_events(source, writer, asked, positions, spacing, mask)
+    return _record_events(source, writer, asked, positions, spacing, mask, store)
 
 
 def _record_events(
@@ -173,6 +173,7 @@ def _record_events(
     track: Track | None,
     spacing: SpacingSettings | None,
     mask: MaskSource | None,
+    place: StorePlace | None,
 ) -> str | None:
     """Write a recording's event images; returns what broke off, where the recording is damaged."""
     recipe = dataclasses.replace(asked, kind="events", size=recording.size)
@@ -181,31 +182,25 @@ def _record_events(
     writer.recipe = recipe
     if isinstance(recording, Recording) and spacer.settings == SpacingSettings():
         _foretell(recording, recipe, writer)
-    writer.mask = pixel_mask(recording.packets(), recording.size, recipe.cleaning, mask)
-    stream = EventImages(recording.size, recipe, writer.mask)
-    packets = _GoodPart(packets_onto(recording, stream.canvas))
+    images = RecordedImages(recording, recipe, mask, place)
     overlap = _Overlap(track)
-    for image, window in images_of(packets, stream):
+    for image, window in images:
         overlap.see(window.t_us)
         if spacer.keeps(window.t_us, window.events):
             writer.add(image, window.t_us, window.events)
     overlap.check()
-    writer.track = _aligned(track, np.array(writer.t_us, np.int64))
+    writer.mask, writer.track = images.mask, _aligned(track, np.array(writer.t_us, np.int64))
     writer.info |= {
         "source": str(recording.path),
         "spacing": to_dict(spacer.settings),
-        "dropped": recording.dropped,
-        "cleaned": stream.cleaned,
+        "dropped": images.info["dropped"],
+        "cleaned": images.info["cleaned"],
+        "store": images.info["store"],
         "left_out": spacer.left_out,
-    } | _remarks(track, {"notes": recording.notes, "fault": packets.fault})
+    } | _remarks(track, images.info)
     if isinstance(recording, SimulatedRecording):
         writer.info["simulated"] = to_dict(recording.sensor) | {"seed": recording.seed}
     return _fault(writer)
-
-
-def packets_onto(recording: Recording | SimulatedRecording, canvas: Canvas | None) -> Iterator[Events]:
-    """The packets of a recording, many of whose events its reader marks on the canvas, if it has one."""
-    return recording.packets(canvas) if isinstance(recording, Recording) else recording.packets()
 
 
 def _foretell(recording: Recording, recipe: Recipe, writer: TraverseWriter) -> None:
@@ -231,7 +226,7 @@ def _record_frames(
     film: Film, writer: TraverseWriter, asked: Recipe, track: Track | None, spacing: SpacingSettings | None
 ) -> str | None:
     """Write camera images, cropped and resized as the recipe says; returns what broke off, as above."""
-    shape, frames, overlap = None, _GoodPart(film.images()), _Overlap(track)
+    shape, frames, overlap = None, GoodPart(film.images()), _Overlap(track)
     spacer = Spacer(spacing, track)
     for t_us, frame in frames:
         if shape is None:
@@ -440,17 +435,3 @@ class _Overlap:
         """After the last image; TrackError where it came before the track's begin."""
         if self._track is not None and self._seen is not None and self._seen[1] < self._track.t_us[0]:
             raise TrackError(str(apart(self._track, *self._seen)))
-
-
-class _GoodPart(Generic[T]):
-    """Packets, or images, up to where they broke off; what broke them off is kept in `fault`."""
-
-    def __init__(self, parts: Iterable[T]) -> None:
-        self._parts = parts
-        self.fault: str | None = None
-
-    def __iter__(self) -> Iterator[T]:
-        try:
-            yield from self._parts
-        except DamagedRecordingError as error:
-            self.fault = str(error)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,20 @@ from evplace.imaging.recipe import Recipe
 from evplace.imaging.windows import TimeWindows, Window, open_windows
 from evplace.sources.cleaning import Cleaner, Mask
 from evplace.sources.readers import Canvas
+
+
+class WindowImager(Protocol):
+    """Makes an image of one window after another."""
+
+    @property
+    def grid(self) -> NDArray[Any] | None:
+        """What readers may mark in place of `add`, or None."""
+
+    def add(self, events: Events) -> None:
+        """Take events of the open window."""
+
+    def image(self, t_us: int) -> NDArray[np.uint8]:
+        """Of the window that ends at `t_us`; starts the next one."""
 
 
 class EventImage(NamedTuple):
@@ -29,13 +43,22 @@ class EventImage(NamedTuple):
 class EventImages:
     """Cleans a stream of events, cuts it into windows and makes images; packet sizes change nothing."""
 
-    def __init__(self, size: Size, recipe: Recipe | None = None, mask: Mask | None = None) -> None:
-        """For a sensor of `size` (width, height) in pixels; `mask` (H, W) is True at pixels to leave out."""
+    def __init__(
+        self,
+        size: Size,
+        recipe: Recipe | None = None,
+        mask: Mask | None = None,
+        imager: WindowImager | None = None,
+    ) -> None:
+        """For a sensor of `size` (width, height) in pixels; `mask` (H, W) is True at pixels to leave out.
+
+        `imager` makes something else of the windows than the recipe's images.
+        """
         recipe = recipe or Recipe()
         self._size = tuple(size)
         self._cleaner = Cleaner(size, recipe.cleaning, mask)
         self._windows = open_windows(recipe.windows)
-        self._imager = Imager(size, recipe.images)
+        self._imager: WindowImager = imager or Imager(size, recipe.images)
         self._last_us: int | None = None
         self.canvas = self._open_canvas(mask)
         """What `Recording.packets` may mark events on in place of handing them over, which is faster. None
@@ -45,6 +68,11 @@ class EventImages:
     def cleaned(self) -> dict[str, int]:
         """Reason -> events left out by the cleaning so far."""
         return self._cleaner.dropped
+
+    def allow_empty(self, windows: int) -> None:
+        """Believe that many windows without events, one after another, where they are cut by time."""
+        if isinstance(self._windows, TimeWindows):
+            self._windows.most_empty = windows
 
     def push(self, events: Events) -> Iterator[EventImage]:
         """The images of all windows that `events` bring to their end.

@@ -79,6 +79,8 @@ class TimeWindows:
         self._open = 1
         self._events = 0
         self._begun = False
+        self.most_empty = MOST_EMPTY
+        """Windows without events, one after another, that are still believed."""
 
     def push(self, events: Events) -> Iterator[tuple[Events, Window | None]]:
         """The packet in pieces, in order, each with the window that it closes, if it closes one.
@@ -128,7 +130,7 @@ class TimeWindows:
     def _check_leap(self, t_us: int, end_us: int) -> None:
         """Whether the windows between an end and the next event can be empty ones of a recording."""
         empty = int((t_us - end_us) / self._dt)
-        if empty > MOST_EMPTY:
+        if empty > self.most_empty:
             raise RecordingError(
                 f"the clock leaps: from {end_us / MICROSECONDS:.3f} s to {t_us / MICROSECONDS:.3f} s no "
                 f"event comes, which makes {empty:,} empty images: cut the recording there, or mend its "

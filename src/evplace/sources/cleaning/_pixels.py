@@ -38,7 +38,8 @@ def hot_pixels(counts: Counts, ratio: float = 3.0, min_events: int = 20) -> Mask
     if not ratio > 1:
         raise SettingsError(f"ratio={ratio} would mask every pixel: give a number above 1")
     bound = max(float(np.median(counts)) * ratio, float(min_events))
-    return np.asarray((counts >= bound) & (counts > ratio * _third_neighbour(counts)), np.bool_)
+    much = counts >= bound
+    return np.asarray(much & (counts > ratio * _third_neighbour(counts, much)), np.bool_)
 
 
 def static_pixels(counts: Counts, share: float = 0.1, block: int = 16) -> Mask:
@@ -46,19 +47,19 @@ def static_pixels(counts: Counts, share: float = 0.1, block: int = 16) -> Mask:
 
     Their median count is below `share` of the median over all blocks: the car's bonnet, a vignette.
     """
-    rows, columns = -(-counts.shape[0] // block), -(-counts.shape[1] // block)
-    medians = np.array(
-        [
-            [
-                np.median(counts[r * block : (r + 1) * block, c * block : (c + 1) * block])
-                for c in range(columns)
-            ]
-            for r in range(rows)
-        ]
-    )
+    lines = range(0, counts.shape[0], block)
+    medians = np.array([_medians(counts[start : start + block], block) for start in lines])
     quiet = medians < share * np.median(medians)
     whole = np.repeat(np.repeat(quiet, block, axis=0), block, axis=1)
     return np.asarray(whole[: counts.shape[0], : counts.shape[1]], np.bool_)
+
+
+def _medians(line: Counts, block: int) -> NDArray[np.float64]:
+    """(columns of blocks,) medians of the blocks of one line of them; the last may be narrower."""
+    whole = line.shape[1] // block * block
+    blocks = line[:, :whole].reshape(len(line), -1, block).swapaxes(0, 1).reshape(whole // block, -1)
+    rest = [np.median(line[:, whole:])] if whole < line.shape[1] else []
+    return np.concatenate([np.median(blocks, axis=1) if whole else [], rest])
 
 
 def without(events: Events, mask: Mask) -> Events:
@@ -103,13 +104,18 @@ def _count(x: NDArray[np.uint16], y: NDArray[np.uint16], counts: Counts) -> None
 
 
 @njit(cache=True)
-def _third_neighbour(counts: Counts) -> Counts:
-    """(H, W) third largest count of the others in the 5x5 block; at the border it moves inwards."""
+def _third_neighbour(counts: Counts, where: Mask) -> Counts:
+    """(H, W) third largest count of the others in the 5x5 block, which moves inwards at the border.
+
+    0 at the pixels where `where` is False.
+    """
     height, width = counts.shape
     third = np.zeros_like(counts)
     for row in range(height):
         top = max(0, min(row - 2, height - 5))
         for column in range(width):
+            if not where[row, column]:
+                continue
             left = max(0, min(column - 2, width - 5))
             first, second, last = 0, 0, 0
             for r in range(top, min(height, top + 5)):
