@@ -13,8 +13,9 @@ from fractions import Fraction
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from evplace.core.compiled import njit
 
 Taps = dict[int, Fraction]
 Resize = Literal["area", "linear"]

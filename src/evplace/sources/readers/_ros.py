@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.sources.readers._ros2_files import ZSTD
 from evplace.sources.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Bytes, Encoding
