@@ -1,7 +1,9 @@
-"""CPU time from a window's end to its Match, for each scorer with its default matcher: python bench/bench_answers.py
+"""CPU time from a window's end to its Match, each scorer with its default matcher.
 
-OPENBLAS_NUM_THREADS=1. 10,000 references of 160x90 from a 640x480 sensor; the network's are places. The window is
-closed by `tick`, so its image is in the time, too. Thread CPU time; sad and cosine read 144 and 576 MB an image.
+    OPENBLAS_NUM_THREADS=1 python bench/bench_answers.py [--references 10000]
+
+10,000 references of 160x90, a 640x480 sensor; the network has places. The window is closed by `tick`, so its
+image is in the time, too. sad and cosine read 144 and 576 MB an image.
 """
 
 from __future__ import annotations
@@ -11,10 +13,9 @@ import platform
 import time
 
 import numpy as np
-from best_cost import street
 
+from best_cost import street
 from evplace import Events, Localizer, PlaceGrid, PlaceRuns, Track, Traverse, train
-from evplace.imaging.images import ImageSettings
 from evplace.imaging.recipe import Recipe
 
 SCORERS = ("fused", "edges", "trained", "ncc", "seqslam", "sad", "network", "cosine")
@@ -27,7 +28,7 @@ def drive(many: int) -> Traverse:
     xy = np.stack([500_000 + 2.0 * np.arange(many), np.full(many, 4e6)], axis=1)
     track = Track.local(t_us, xy, np.full(many, 90.0))
     images = np.ascontiguousarray(street(many, 0))
-    return Traverse(images, t_us, np.full(many, 5000), track, Recipe("events", SENSOR, images=ImageSettings()))
+    return Traverse(images, t_us, np.full(many, 5000), track, Recipe("events", SENSOR))
 
 
 def end_of(number: int) -> int:
