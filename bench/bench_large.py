@@ -1,6 +1,6 @@
 """Memory of paths through tables that no memory holds: python bench/bench_large.py [--queries 2000 6000]
 
-100,000 references. What `path` needs beyond 256 MiB a table lies in a file, so the peak does not grow with the
+100,000 references. What `path` needs beyond 256 MiB a table lies in a file: the peak does not grow with the
 queries; the file does, by 6 bytes a cell: 60 GB for 100,000 queries.
 """
 

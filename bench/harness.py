@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import gc
 import os
+import platform
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -44,6 +46,16 @@ def cpu_seconds() -> float:
     """CPU seconds of this process, and of its children that have ended."""
     times = os.times()
     return time.process_time() + times.children_user + times.children_system
+
+
+def processor() -> str:
+    """The name of this machine's processor, as Linux says it, else as Python does."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    names = {line.partition(":")[2].strip() for line in lines if line.startswith("model name")}
+    return ", ".join(sorted(names)) or platform.machine()
 
 
 def report(title: str, timings: dict[str, Timing], unit: float = 1.0, unit_name: str = "s") -> None:

@@ -77,6 +77,11 @@ def rmc_log(log: Log, checked: bool = True) -> str:
     return "".join(sentence(rmc_body(*row), checked) + "\r\n" for row in log.rows())
 
 
+def gga_log(log: Log) -> str:
+    """GGA sentences, without dates and speeds."""
+    return "".join(sentence(gga_body(*row[:3])) + "\r\n" for row in log.rows())
+
+
 def csv_log(log: Log) -> str:
     """The default columns, without the log's own speed."""
     lines = [f"{round(t * 1e6)},{lat:.8f},{lon:.8f}" for t, lat, lon, _, _ in log.rows()]
@@ -93,8 +98,8 @@ def gpx_log(log: Log) -> str:
 
 
 def iso(t_s: float) -> str:
-    """2020-04-21T07:03:02Z"""
-    return f"{datetime.datetime.fromtimestamp(t_s, datetime.UTC):%Y-%m-%dT%H:%M:%SZ}"
+    """2020-04-21T07:03:02Z, or 2020-04-21T07:03:02.200000Z"""
+    return datetime.datetime.fromtimestamp(t_s, datetime.UTC).replace(tzinfo=None).isoformat() + "Z"
 
 
 def written(folder: Path, text: str | bytes, name: str = "log.txt") -> Path:

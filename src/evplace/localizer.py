@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from evplace.core import families
 from evplace.core.errors import PartError, PlaceMapError, RecordingError
-from evplace.core.events import Events
+from evplace.core.events import Events, Size
 from evplace.core.settings import make, to_dict
 from evplace.core.tables import empty_rows, rows_of
 from evplace.imaging.activity import Activity
@@ -33,6 +33,7 @@ from evplace.matchers._drives import follow, in_hindsight
 from evplace.placemap import PlaceMap, default_matcher
 from evplace.scorers import OpenScorer, Rows, scorer_of
 from evplace.sources.cleaning import MaskSource, read_mask
+from evplace.sources.readers import Canvas
 
 BLOCK = 64
 """Images scored at once in hindsight."""
@@ -134,9 +135,17 @@ class Localizer:
     def push(self, events: Events) -> Iterator[Match]:
         """The matches of all windows that `events` bring to their end."""
         if self._images is None:
-            self._images = self._open_images(events)
+            self._images = self._open_images(events.size)
         for image in self._images.push(events):
             yield from self._matches_of(image)
+
+    def canvas(self, size: Size) -> Canvas | None:
+        """What `Recording.packets` may mark the events of a sensor of that size on: see `EventImages`.
+
+        The packets are to be pushed here. Raises what the first `push` would.
+        """
+        self._images = self._images or self._open_images(size)
+        return self._images.canvas
 
     def tick(self, t_us: int) -> Iterator[Match]:
         """The matches of all windows that are over once no event up to `t_us` will come any more.
@@ -307,18 +316,18 @@ class Localizer:
             None if np.isnan(heading) else heading, more.others,
         )  # fmt: skip
 
-    def _open_images(self, events: Events) -> EventImages:
+    def _open_images(self, size: Size) -> EventImages:
         recipe = self.map.recipe
         if recipe is None or recipe.kind != "events":
             made = "camera images" if recipe is not None else "images whose making is not known"
             raise PlaceMapError(f"the map was made from {made}: it cannot localise events")
-        if recipe.size is not None and tuple(events.size) != recipe.size:
+        if recipe.size is not None and tuple(size) != recipe.size:
             raise RecordingError(
                 f"the map was made with a sensor of {shown(recipe.size)} pixels, this recording has "
-                f"{shown(tuple(events.size))}: give the map's own sensor, or train a map with this one"
+                f"{shown(tuple(size))}: give the map's own sensor, or train a map with this one"
             )
-        mask = None if self.mask is None else read_mask(self.mask, events.size)
-        return EventImages(events.size, recipe, mask)
+        mask = None if self.mask is None else read_mask(self.mask, size)
+        return EventImages(size, recipe, mask)
 
 
 class _Seeing:

@@ -49,13 +49,7 @@ def main(kind: str, name: str, seed: int, first: int, count: int, board: Path) -
     """Do the cases from `first` to `count`; returns how many ended in an exception that nobody meant."""
     answered = refused = foreign = 0
     with tempfile.TemporaryDirectory(dir=_memory()) as folder, board.open("r+b", buffering=0) as written:
-        case: Case = {
-            "flip": _recording,
-            "cut": _recording,
-            "log": _log,
-            "folder": _folder,
-            "settings": _settings,
-        }[kind](Path(folder), kind, name, seed)
+        case = cases(Path(folder), kind, name, seed)
         for number in range(first, count):
             written.seek(0)
             written.write(BOARD.pack(number, answered, refused, foreign))
@@ -72,6 +66,12 @@ def main(kind: str, name: str, seed: int, first: int, count: int, board: Path) -
         written.write(BOARD.pack(count, answered, refused, foreign))
     print(_megabytes())
     return foreign
+
+
+def cases(folder: Path, kind: str, name: str, seed: int) -> Case:
+    """What does the cases of a kind, with files in `folder`."""
+    makers = {"flip": _recording, "cut": _recording, "log": _log, "folder": _folder, "settings": _settings}
+    return makers[kind](folder, kind, name, seed)
 
 
 def _megabytes() -> int:
@@ -98,9 +98,11 @@ def _refused(error: EvplaceError) -> bool:
 
 
 def damaged(data: bytes, kind: str, seed: int, number: int) -> bytes:
-    """A recording with one bit flipped, or cut off, another for each number."""
+    """A recording with one bit flipped, with two to four in every second case, or cut off."""
     if kind == "flip":
-        return flipped(data, seed, number)
+        for more in range(1 if number // 2 % 2 == 0 else 2 + number // 4 % 3):
+            data = flipped(data, seed + more, number)
+        return data
     return data[: random.Random(f"{seed} {number}").randrange(len(data))]
 
 

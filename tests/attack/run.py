@@ -1,7 +1,7 @@
 """The attack: what other programs, broken and full disks, kills and hostile people do, in great number.
 
-    python tests/attack/run.py --share 1          all of it, hours
-    python tests/attack/run.py --share 0.01       a hundredth
+    python tests/attack/run.py --share 1 --keep FILE      all of it; begun again, it goes on
+    python tests/attack/run.py --share 0.01               a hundredth
 
 It prints a line for each kind, and ends with 1 where anything was found: a crash, a hang of over 10 s of
 work, an exception that nobody meant, an output that is not whole, or more than 512 MB of memory. See
@@ -11,6 +11,9 @@ docs/promises.md.
 from __future__ import annotations
 
 import argparse
+import hashlib
+import json
+import math
 import os
 import random
 import subprocess
@@ -18,12 +21,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 
 from cases import BOARD, ISOLATED, damaged, whole
-from outputs import full_disks, hostile_files, kills
+from outputs import Outcome, full_disks, hostile_files, kills, prepared
 
 from evplace.core.errors import EvplaceError
 from evplace.sources.readers import open_recording
@@ -118,34 +121,74 @@ def _read_as_users_do(form: str, kind: str, seed: int, number: int) -> None:
         check_packets(open_recording(path, SIZE).packets(), SIZE, form)
 
 
-def parts(share: float, seed: int, only: str) -> Iterator[tuple[str, Counts]]:
-    """Each kind of attack whose name begins with `only`, with what became of it."""
+class Kept:
+    """What became of the kinds that are done, in a file, so that a run that was stopped goes on."""
+
+    def __init__(self, file: Path | None, seed: int, share: float) -> None:
+        """Go on from `file`; ValueError where it was begun with other code, another seed or share."""
+        self._file, self.done = file, dict[str, Counts]()
+        head = json.dumps({"seed": seed, "share": share, "code": _code()})
+        lines = file.read_text().splitlines() if file and file.exists() else []
+        if lines and lines[0] != head:
+            raise ValueError(f"{file} was begun as {lines[0]}, this is {head}: give another --keep")
+        for line in lines[1:]:
+            name, counts = json.loads(line)
+            self.done[name] = Counts(**counts)
+        if not lines:
+            self._add(head)
+
+    def keep(self, name: str, counts: Counts) -> None:
+        """A kind is done."""
+        self.done[name] = counts
+        self._add(json.dumps([name, asdict(counts)]))
+
+    def _add(self, line: str) -> None:
+        if self._file is not None:
+            with self._file.open("a") as file:
+                file.write(f"{line}\n")
+
+
+def _code() -> str:
+    """A checksum of the code that is attacked, and of the attack."""
+    here = Path(__file__).resolve().parents[2]
+    files = [*here.glob("src/**/*.py"), *here.glob("tests/**/*.py")]
+    told = [f"{file.relative_to(here)} {hashlib.sha256(file.read_bytes()).hexdigest()}" for file in files]
+    return hashlib.sha256("\n".join(sorted(told)).encode()).hexdigest()[:16]
+
+
+def parts(share: float, seed: int, only: str) -> dict[str, Callable[[], Counts]]:
+    """Each kind of attack whose name begins with one of `only`, and what does it."""
     from made import MAKERS
     from test_fuzz import WHOLE
 
-    def some(count: int) -> int:
-        return max(1, round(count * share))
+    def some(count: int, kinds: int = 1) -> int:
+        return math.ceil(count * share / kinds)
 
     logs, commands = [*WHOLE, "bag"], ("images", "train", "localize", "evaluate")
     kinds: dict[str, Callable[[], Counts]] = {}
     for name in FOLDERS_OF:
-        kinds[f"altered {name}"] = partial(many, "folder", name, some(FOLDERS // len(FOLDERS_OF)), seed)
+        kinds[f"altered {name}"] = partial(many, "folder", name, some(FOLDERS, len(FOLDERS_OF)), seed)
     for name in logs:
-        kinds[f"logs as {name}"] = partial(many, "log", name, some(LOGS // len(logs)), seed)
+        kinds[f"logs as {name}"] = partial(many, "log", name, some(LOGS, len(logs)), seed)
     for name in commands:
-        kinds[f"settings of {name}"] = partial(many, "settings", name, some(SETTINGS // len(commands)), seed)
-    kinds["kills"] = lambda: _counted(kills(some(KILLS), seed))
-    kinds["full disks"] = lambda: _counted(full_disks(share < 0.1))
-    kinds["hostile files"] = lambda: _counted(hostile_files())
+        kinds[f"settings of {name}"] = partial(many, "settings", name, some(SETTINGS, len(commands)), seed)
+    disks_kb = (16,) if share < 0.1 else (4, 16, 64, 256)
+    kinds["kills"] = lambda: counted(_prepared(kills, some(KILLS), seed))
+    kinds["full disks"] = lambda: counted(_prepared(full_disks, disks_kb))
+    kinds["hostile files"] = lambda: counted(hostile_files())
     for form in sorted(MAKERS):
         kinds[f"cuts of {form}"] = partial(many, "cut", form, some(CUTS), seed)
         kinds[f"flips of {form}"] = partial(many, "flip", form, some(FLIPS), seed)
-    for kind, attack in kinds.items():
-        if kind.startswith(tuple(only.split(","))):
-            yield kind, attack()
+    return {kind: attack for kind, attack in kinds.items() if kind.startswith(tuple(only.split(",")))}
 
 
-def _counted(outcomes: Iterator[tuple[str, str, int]]) -> Counts:
+def _prepared(attack: Callable[..., Iterator[Outcome]], *arguments: object) -> Iterator[Outcome]:
+    """An attack in a folder of its own."""
+    with tempfile.TemporaryDirectory() as name:
+        yield from attack(prepared(Path(name)), *arguments)
+
+
+def counted(outcomes: Iterator[Outcome]) -> Counts:
     """The sum of outcomes: what was done, what was found wrong (empty for nothing), and megabytes used."""
     counts = Counts()
     for what, wrong, megabytes in outcomes:
@@ -164,18 +207,33 @@ def main() -> int:
     parser.add_argument("--share", type=float, default=1.0, help="of the full counts")
     parser.add_argument("--seed", type=int, default=random.randrange(1 << 30))
     parser.add_argument("--only", default="", help="kinds whose names begin so, with commas between")
+    parser.add_argument("--keep", type=Path, help="a file of what is done: begun again, the run goes on")
     args = parser.parse_args()
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    try:
+        kept = Kept(args.keep, args.seed, args.share)
+    except ValueError as error:
+        parser.error(str(error))
     print(f"seed {args.seed}, share {args.share:g}", flush=True)
-    good, began = True, time.monotonic()
-    for name, counts in parts(args.share, args.seed, args.only):
+    good = True
+    for name, attack in parts(args.share, args.seed, args.only).items():
+        before, began, worked_s = name in kept.done, time.monotonic(), _worked_s()
+        if not before:
+            kept.keep(name, attack())
+        counts = kept.done[name]
+        took = f"{_worked_s() - worked_s:,.0f} s of work in {time.monotonic() - began:,.0f} s"
+        verdict = "ok  " if counts.is_good else "BAD "
+        print(f"{verdict} {name}: {counts} [{'kept' if before else took}]", flush=True)
         good = good and counts.is_good
-        took = time.monotonic() - began
-        print(f"{'ok  ' if counts.is_good else 'BAD '} {name}: {counts} [{took:,.0f} s]", flush=True)
         for found in counts.found[:5]:
             print(f"     {found.strip()[-3000:]}", flush=True)
     print("nothing was found" if good else "something was found: see BAD above", flush=True)
     return 0 if good else 1
+
+
+def _worked_s() -> float:
+    """Seconds of the processor that this process and those it started and awaited have had."""
+    return sum(os.times()[:4])
 
 
 if __name__ == "__main__":

@@ -97,7 +97,20 @@ def test_what_was_left_out_of_the_log_is_told() -> None:
     damaged = found(gps, EVENTS, "GPS log", replace(track, fault="it breaks off"))
     assert damaged.state == "bad"
     assert damaged.sentence.startswith("The log is damaged: it breaks off. ")
-    assert "slow drift" in found(gps, EVENTS, "GPS fixes", track).sentence
+
+
+@pytest.mark.parametrize(
+    ("held_against", "words"),
+    [
+        ("speed and course", "No slow drift:"),
+        ("speed", "to the side is not checked"),
+        ("", "drift is not checked"),
+    ],
+)
+def test_it_is_said_whether_a_drift_would_show(held_against: str, words: str) -> None:
+    for dropped in ({}, {"no fix": 3}):
+        track = replace(road(T_S, 8 * T_S), held_against=held_against, dropped=dropped)
+        assert words in found(gps, EVENTS, "GPS fixes", track).sentence
 
 
 @pytest.mark.parametrize(

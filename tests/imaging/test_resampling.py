@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
@@ -14,6 +15,7 @@ from evplace.imaging._resampling import (
     AxisMap,
     Resampler,
     Resize,
+    Taps,
     _area,
     _blurred,
     _linear,
@@ -40,11 +42,19 @@ def exact(n_in: int, n_kept: int, n_out: int, blur: bool, resize: Resize) -> lis
     for row in range(n_in):
         for shift, weight in ((-1, 1), (0, 2), (1, 1)) if blur else ((0, 4),):
             spread[row][list(np.pad(np.arange(n_in), 1, "reflect"))[row + shift + 1]] += Fraction(weight, 4)
-    taps = _area(n_kept, n_out) if resize == "area" else _linear(n_kept, n_out)
+    taps = shares(_area if resize == "area" else _linear, n_kept, n_out)
     return [
         [sum((weight * spread[i][k] for i, weight in row.items()), Fraction(0)) for k in range(n_in)]
         for row in taps
     ]
+
+
+def shares(
+    resize: Callable[[int, int], tuple[list[Taps], int]], n_in: int, n_out: int
+) -> list[dict[int, Fraction]]:
+    """The taps of each output as shares of it."""
+    rows, total = resize(n_in, n_out)
+    return [{index: Fraction(weight, total) for index, weight in row.items()} for row in rows]
 
 
 @given(lengths, st.integers(1, 40), outputs, st.booleans(), kinds)
@@ -63,7 +73,9 @@ def test_every_map_is_the_exact_composition(
 
 @given(lengths, outputs)
 def test_areas_take_an_equal_share_of_every_input(n_in: int, n_out: int) -> None:
-    total = [sum((row.get(k, Fraction(0)) for row in _area(n_in, n_out)), Fraction(0)) for k in range(n_in)]
+    total = [
+        sum((row.get(k, Fraction(0)) for row in shares(_area, n_in, n_out)), Fraction(0)) for k in range(n_in)
+    ]
     assert total == [Fraction(n_out, n_in)] * n_in
 
 
@@ -71,7 +83,7 @@ def test_areas_take_an_equal_share_of_every_input(n_in: int, n_out: int) -> None
 def test_a_line_is_interpolated_exactly_between_the_outer_centres(
     n_in: int, n_out: int, slope: int, start: int
 ) -> None:
-    for out, taps in enumerate(_linear(n_in, n_out)):
+    for out, taps in enumerate(shares(_linear, n_in, n_out)):
         at = Fraction(2 * out + 1, 2) * Fraction(n_in, n_out) - Fraction(1, 2)
         at = min(max(at, Fraction(0)), Fraction(n_in - 1))
         assert sum(weight * (slope * index + start) for index, weight in taps.items()) == slope * at + start
@@ -81,16 +93,15 @@ def test_a_line_is_interpolated_exactly_between_the_outer_centres(
 @given(lengths)
 def test_the_same_length_is_left_as_it_is(n: int) -> None:
     for resize in (_area, _linear):
-        assert resize(n, n) == [{k: Fraction(1)} for k in range(n)]
+        assert shares(resize, n, n) == [{k: Fraction(1)} for k in range(n)]
 
 
 def test_the_borders_are_mirrored_without_repeating_the_edge() -> None:
     assert [_mirrored(k, 5) for k in range(-1, 6)] == [1, 0, 1, 2, 3, 4, 3]
     assert _mirrored(-1, 1) == _mirrored(1, 1) == 0
-    quarter, half = Fraction(1, 4), Fraction(1, 2)
-    assert _blurred({0: Fraction(1)}, 4) == {1: half, 0: half}
-    assert _blurred({1: Fraction(1)}, 4) == {0: quarter, 1: half, 2: quarter}
-    assert _blurred({0: Fraction(1)}, 1) == {0: Fraction(1)}
+    assert _blurred({0: 1}, 4) == {1: 2, 0: 2}
+    assert _blurred({1: 1}, 4) == {0: 1, 1: 2, 2: 1}
+    assert _blurred({0: 1}, 1) == {0: 4}
 
 
 SHAPES = [(7, 9, 3, 4), (24, 32, 9, 16), (33, 20, 33, 20), (16, 50, 5, 7), (260, 346, 90, 160), (5, 5, 8, 8)]

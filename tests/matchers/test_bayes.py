@@ -14,6 +14,8 @@ from evplace.matchers import _belief as belief
 from evplace.matchers import _route_filter as loops
 from evplace.matchers import _traces as traces
 from evplace.matchers._calibration import LATE, LIVE
+from evplace.matchers._known import threshold
+from evplace.matchers._known_weights import ELSEWHERE
 from evplace.matchers._surroundings import cells
 from evplace.matchers._ways import Ways
 from evplace.matchers.bayes import Bayes
@@ -306,6 +308,18 @@ def test_more_false_accepts_are_allowed_more_answers_are_accepted() -> None:
         for share in (0.001, 0.01, 0.1, 0.5)
     ]
     assert accepted == sorted(accepted)
+
+
+def test_late_answers_are_asked_halfway_to_what_other_towns_ask() -> None:
+    unknown = np.linspace(0, 0.2, 1000)
+    assert threshold(unknown, 0.01, late=False) == pytest.approx(0.198)
+    late = threshold(unknown, 0.01, late=True)
+    assert 0.198 < late < ELSEWHERE[3]
+    odds = [p / (1 - p) for p in (0.198, late, ELSEWHERE[3])]
+    assert odds[1] ** 2 == pytest.approx(odds[0] * odds[2], rel=1e-6)
+    given = [threshold(unknown, share, late=True) for share in (0.0001, 0.001, 0.01, 0.1, 0.5, 0.9)]
+    assert given == sorted(given, reverse=True)
+    assert np.isfinite(threshold(np.ones(200), 0.01, late=True))
 
 
 def test_what_was_learned_must_be_what_is_learned() -> None:

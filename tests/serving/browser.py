@@ -117,7 +117,7 @@ def opened(profile: Path, wait: Callable[[float], None] = time.sleep) -> Iterato
             assert process.poll() is None, "the browser ended"
             wait(0.05)
         number = port.read_text().split()[0]
-        with connect(_page_of(number), max_size=None, open_timeout=HANG_S) as socket:
+        with connect(_page_of(number), max_size=None, open_timeout=HANG_S, close_timeout=0.1) as socket:
             yield Tab(socket)
     finally:
         process.kill()

@@ -48,7 +48,8 @@ class Served:
         """A WebSocket, as a context."""
         from websockets.sync.client import connect
 
-        return connect(f"ws://127.0.0.1:{self.port}{path}", open_timeout=HANG_S, **more)
+        address = f"ws://127.0.0.1:{self.port}{path}"
+        return connect(address, open_timeout=HANG_S, close_timeout=0.1, **more)
 
     def raw(self) -> socket.socket:
         """A bare connection."""

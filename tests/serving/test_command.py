@@ -46,11 +46,11 @@ def folder(image_map: PlaceMap, night_drive: Drive, tmp_path_factory: pytest.Tem
 class Running:
     """A service in a process of its own."""
 
-    def __init__(self, folder: Path, *more: str) -> None:
+    def __init__(self, folder: Path, *more: str, **process: Any) -> None:
         command = [sys.executable, "-m", "evplace", "serve", "--map", str(folder / "street.evp"), *more]
         self.process = subprocess.Popen(
             [*command, "--matcher", "best", "--port", "0"],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.PIPE, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.PIPE, text=True, **process,
         )  # fmt: skip
         assert self.process.stderr is not None
         self.said = ""
@@ -81,8 +81,8 @@ class Running:
 
 
 @contextlib.contextmanager
-def running(folder: Path, *more: str) -> Iterator[Running]:
-    service = Running(folder, *more)
+def running(folder: Path, *more: str, **process: Any) -> Iterator[Running]:
+    service = Running(folder, *more, **process)
     try:
         yield service
     finally:
@@ -114,6 +114,30 @@ def test_a_signal_ends_it_well(folder: Path, tmp_path: Path, sent: signal.Signal
     for line in lines.read_text().splitlines():
         assert json.loads(line)["map_sha256"]
     assert not [file for file in tmp_path.iterdir() if file.name.startswith(".")]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="files are limited in size by the system on Unix alone")
+@pytest.mark.parametrize("name", ["came.raw", "came.aedat4", "came.h5"])
+def test_a_full_disk_ends_the_recording_alone_and_is_said(folder: Path, tmp_path: Path, name: str) -> None:
+    """No file may grow beyond 60 kB here: that fails where a full disk does, when it is written."""
+    import resource
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+
+    more = ("--source", str(folder / "night.raw"), "--source-set", "loops=0", "--source-set", "speed=20")
+    with running(folder, *more, "--record", str(tmp_path / name), preexec_fn=limit) as service:
+        state = service.until(lambda state: state["recording"]["fault"] is not None)
+        assert name in state["recording"]["fault"]
+        later = service.until(lambda now: now["match"]["host_s"] > state["match"]["host_s"] + 0.05)
+        assert localised(later)
+        assert later["counters"]["not_recorded"] > 0
+        service.process.send_signal(signal.SIGTERM)
+        code, _, said = service.ended()
+    assert code == 0
+    assert said.count("Traceback") == 0
+    assert state["recording"]["fault"] in said
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_it_ends_with_its_source_where_it_is_told_to(

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import os
 import time
+import tracemalloc
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,7 +23,10 @@ from evplace.serving._clock import LEAP_US, Sieve
 from evplace.serving._feed import PACKET, Feed, Packet
 from evplace.serving._recorder import Recorder
 from evplace.sources.live import ANEW
+from evplace.sources.live._bytes import FORMATS, ByteStream
+from evplace.sources.live.stdin import Piped
 from evplace.sources.readers import Block, open_recording
+from made_streams import as_bytes
 
 SIZE = (80, 60)
 
@@ -86,6 +92,44 @@ def test_good_events_pass_unchanged(drive: Events) -> None:
     np.testing.assert_array_equal(found.x, drive.x)
     assert feed.counters().events == len(drive)
     assert feed.fault is None
+
+
+def test_a_stream_that_says_late_that_it_is_of_another_sensor_is_ended(drive: Events) -> None:
+    """A pipe's header comes with its events: none of them is taken for one of the map's sensor."""
+    reading, writing = os.pipe()
+    with os.fdopen(writing, "wb") as pipe:
+        pipe.write(as_bytes("evt3", dataclasses.replace(drive[:500], size=(346, 260))))
+    feed = Feed(Piped(reading, None, SIZE, 0.0), SIZE)
+    feed.start()
+    ended(feed)
+    os.close(reading)
+    assert feed.fault is not None
+    assert "sensor of 80x60 pixels, this source has 346x260" in feed.fault
+    assert feed.counters().events == 0
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_garbage_without_end_is_held_in_bounded_memory_and_good_events_pass_after_it(
+    format: str, drive: Events
+) -> None:
+    """Eight million bytes of anything, in the middle of a stream."""
+    rng = np.random.default_rng(0)
+    data = as_bytes(format, drive[:2000])
+    after = as_bytes(format, drive[2000:4000]).partition(b"% end\n")[2] or as_bytes(format, drive[2000:4000])
+    stream = ByteStream("packed" if format == "packed" else None)
+    sieve = Sieve(SIZE)
+    tracemalloc.start()
+    passed = 0
+    for part in (data, *(rng.bytes(65_520).replace(b"\n", b"?") for _ in range(128)), b"\n", after, after):
+        for found in stream.push(part):
+            passed += sum(len(one.t_us) for one in sieve.push(found, 0.0, 0.0).blocks)
+        held = len(stream._held)
+        assert held <= 1 << 16
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 20e6
+    assert passed >= 2000
+    assert sum(sieve.dropped.values()) + stream.lost > 0
 
 
 def test_what_is_outside_the_sensor_or_runs_backwards_is_left_out_and_counted() -> None:

@@ -244,6 +244,41 @@ def test_a_body_that_is_too_large_is_refused(fed: Fed) -> None:
     still_answers(fed)
 
 
+def test_a_body_that_does_not_come_is_given_up(fed: Fed, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("evplace.serving._web.BODY_S", 0.2)
+    with fed.served.raw() as socket:
+        socket.sendall(b"POST /replay HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n")
+        socket.sendall(b"Content-Length: 10\r\n\r\n{")
+        assert socket.recv(4096).startswith(b"HTTP/1.1 408")
+    still_answers(fed)
+
+
+@pytest.mark.parametrize("sent", ["x" * 5000, b"\0" * 5000])
+def test_one_who_says_too_much_is_hung_up_on(fed: Fed, sent: str | bytes) -> None:
+    """Nothing of ours listens to what comes by a WebSocket, so that it holds 4 kB at most."""
+    from websockets.exceptions import ConnectionClosed
+
+    for path in ("/live", "/pictures"):
+        with fed.served.listen(path) as socket, pytest.raises(ConnectionClosed, match="1009"):
+            socket.send(sent)
+            while True:
+                socket.recv(timeout=HANG_S)
+    fed.served.until(lambda: fed.served.json("/state")["clients"] == 0)
+    still_answers(fed)
+
+
+def test_too_many_connections_are_sent_away(
+    image_map: PlaceMap, street: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("evplace.serving.server.CONNECTIONS", 3)
+    with serving(image_map, street, Made()) as served:
+        resting = [served.raw() for _ in range(3)]
+        served.until(lambda: served.ask("/state")[0] == 503)
+        for socket in resting:
+            socket.close()
+        served.until(lambda: served.ask("/state")[0] == 200)
+
+
 def test_requests_that_come_byte_by_byte_are_given_up(fed: Fed, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("evplace.serving._connections.HEADER_S", 0.2)
     slow = [fed.served.raw() for _ in range(50)]

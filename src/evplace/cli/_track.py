@@ -44,8 +44,8 @@ class TrackFlags(SettingsFlags):
     """Day of the first fix, as 2020-04-21, for a log without dates; else the recording's is taken."""
     track_max_speed: float = MAX_SPEED_MPS
     """Fastest that the vehicle goes, in m/s: fixes that need more are left out."""
-    track_keep: Literal["before", "after"] | None = None
-    """Which side is right where the log's clock was set on the way."""
+    track_keep: Literal["before", "after", "both"] | None = None
+    """Which side is right where the log's clock was set, or its positions leapt; of a clock also both."""
 
     def opened_track(self) -> Track | None:
         """The track; None without one. SettingsError where flags say how to read one that is not given."""

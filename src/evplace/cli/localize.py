@@ -29,7 +29,7 @@ from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.cli._recording import DriveFlags
 from evplace.core.errors import DamagedRecordingError, SettingsError
 from evplace.core.storage import new_file
-from evplace.drives.to_traverse import Reading, open_source_for, recorded_as
+from evplace.drives.to_traverse import Reading, open_source_for, packets_onto, recorded_as
 from evplace.imaging.traverse import MARK as TRAVERSE
 from evplace.localizer import Localizer, Match
 from evplace.placemap import PlaceMap
@@ -89,7 +89,7 @@ class _Drive:
             return
         note_guesses(events.notes)
         try:
-            for packet in events.packets():
+            for packet in packets_onto(events, self._where.canvas(events.size)):
                 yield from self._where.push(packet)
         except DamagedRecordingError as error:
             self.fault = str(error)

@@ -16,7 +16,12 @@ LEAP_M = 20.0
 """A shorter step is no jump: noise, or one cell of the map."""
 AROUND = 5
 """Steps before and after by which a step is judged."""
-UNSEEN = "A slow drift shows only against a speed and course of the log's own: else it is not checked."
+DRIFTS = {
+    "speed and course": "No slow drift: the positions go as the log's own speed and course say",
+    "speed": "A slow drift to the side is not checked: that takes a speed and course of the log's own",
+    "": "A slow drift is not checked: that takes a speed and course of the log's own",
+}
+"""What the positions were held against -> what is known of a drift."""
 ADVICE = {
     "no fix": "keep the receiver in the open and wait for its fix before driving off",
     "repeated": "have the receiver hold no position while it moves (static navigation off), and in the open",
@@ -53,15 +58,16 @@ def _quality(track: Track) -> Finding:
     if len(track) < 2:
         advice = "give the log of the whole drive"
         return Finding("GPS fixes", "bad", share, "% unusable", f"{sentence}: that makes no track.", advice)
+    drift = DRIFTS[track.held_against]
     if not lost:
-        return Finding("GPS fixes", "good", 0.0, "% unusable", f"{sentence}; all can be used. {UNSEEN}")
+        return Finding("GPS fixes", "good", 0.0, "% unusable", f"{sentence}; all can be used. {drift}.")
     reasons = ", ".join(f"{number:,} {reason}" for reason, number in track.dropped.items())
     state: State = "good" if share < 1 else "look" if share < 20 else "bad"
     most = max(track.dropped, key=lambda reason: track.dropped[reason])
     fit = next((ADVICE[begin] for begin in ADVICE if most.startswith(begin)), ELSE)
     advice = "" if state == "good" else fit
     return Finding(
-        "GPS fixes", state, share, "% unusable", f"{sentence}; left out: {reasons}. {UNSEEN}", advice
+        "GPS fixes", state, share, "% unusable", f"{sentence}; left out: {reasons}. {drift}.", advice
     )
 
 

@@ -20,7 +20,7 @@ from evplace.core.errors import (
     TraverseError,
     UnsupportedError,
 )
-from evplace.core.events import Size
+from evplace.core.events import Events, Size
 from evplace.core.settings import make, to_dict
 from evplace.drives import datasets
 from evplace.drives.datasets import Drive
@@ -32,7 +32,7 @@ from evplace.imaging.traverse import MARK, Traverse, TraverseWriter
 from evplace.sources.cleaning import CleaningSettings, MaskSource, pixel_mask
 from evplace.sources.film import VIDEOS, Film, film_of, is_video, open_film
 from evplace.sources.frames import is_frames, open_frames
-from evplace.sources.readers import Recording, is_recording, open_recording
+from evplace.sources.readers import Canvas, Recording, is_recording, open_recording
 from evplace.sources.simulators.recording import SimulatedRecording
 from evplace.sources.tracks import Track, open_track
 from evplace.sources.tracks._apart import apart, on_day_of
@@ -183,7 +183,7 @@ def _record_events(
         _foretell(recording, recipe, writer)
     writer.mask = pixel_mask(recording.packets(), recording.size, recipe.cleaning, mask)
     stream = EventImages(recording.size, recipe, writer.mask)
-    packets = _GoodPart(recording.packets())
+    packets = _GoodPart(packets_onto(recording, stream.canvas))
     overlap = _Overlap(track)
     for image, window in images_of(packets, stream):
         overlap.see(window.t_us)
@@ -201,6 +201,11 @@ def _record_events(
     if isinstance(recording, SimulatedRecording):
         writer.info["simulated"] = to_dict(recording.sensor) | {"seed": recording.seed}
     return _fault(writer)
+
+
+def packets_onto(recording: Recording | SimulatedRecording, canvas: Canvas | None) -> Iterator[Events]:
+    """The packets of a recording, many of whose events its reader marks on the canvas, if it has one."""
+    return recording.packets(canvas) if isinstance(recording, Recording) else recording.packets()
 
 
 def _foretell(recording: Recording, recipe: Recipe, writer: TraverseWriter) -> None:

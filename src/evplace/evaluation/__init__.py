@@ -9,6 +9,7 @@ accuracy, as it does by all evidence in the paper; the accuracy on seen queries 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import platform
 import sys
 from collections.abc import Iterable, Mapping
@@ -211,7 +212,10 @@ def versions() -> dict[str, str]:
     """Versions of this package, python, and those packages at work here that can change a figure."""
     loaded = [name for name in ("numpy", "numba", "onnxruntime", "torch") if name in sys.modules]
     ours = {"evplace": __version__, "python": platform.python_version()}
-    return ours | {name: metadata.version(name) for name in loaded}
+    return ours | {name: _version_of(name) for name in loaded}
+
+
+_version_of = functools.cache(metadata.version)
 
 
 def _named(result: Result | str | Path, number: int) -> tuple[str, Result]:

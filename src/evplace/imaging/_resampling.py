@@ -1,15 +1,15 @@
 """Blur, crop and resize as one sparse linear map for each axis, with exact integer weights.
 
 Each of the three steps is linear and separable, so their composition is too: out = R_y I R_x^T, where a row
-of R has a few neighbouring taps. Composed in exact fractions and brought to one denominator, the whole map is
+of R has a few neighbouring taps. Composed in whole numbers, over one denominator, the whole map is
 exact for binary images: integer sums and one division at the end.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any, Literal
 
 import numpy as np
@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from evplace.core.compiled import njit
 
-Taps = dict[int, Fraction]
+Taps = dict[int, int]
+"""Input -> its weight in an output."""
 Resize = Literal["area", "linear"]
 
-BLUR = (Fraction(1, 4), Fraction(1, 2), Fraction(1, 4))
-"""The 3x3 Gaussian for each axis: OpenCV's kernel for size 3 with sigma 0 (paper, section 3.2)."""
+BLUR = (1, 2, 1)
+"""The 3x3 Gaussian for each axis, in quarters: OpenCV's kernel for size 3, sigma 0 (paper, section 3.2)."""
 
 
 @dataclass(frozen=True)
@@ -36,42 +37,47 @@ class AxisMap:
     """What the weights of every output sum to: divide by it."""
 
 
+@functools.lru_cache(maxsize=64)  # a frame at a time, it would take longer than the frame
 def axis_map(n_in: int, n_kept: int, n_out: int, blur: bool, resize: Resize) -> AxisMap:
     """Blur all `n_in` inputs, keep the first `n_kept`, resize them to `n_out`."""
-    resized = _area(n_kept, n_out) if resize == "area" else _linear(n_kept, n_out)
+    resized, total = _area(n_kept, n_out) if resize == "area" else _linear(n_kept, n_out)
     rows = [_blurred(taps, n_in) if blur else taps for taps in resized]
-    total = math.lcm(*(weight.denominator for taps in rows for weight in taps.values()))
+    total *= sum(BLUR) if blur else 1
+    common = math.gcd(total, *(weight for taps in rows for weight in taps.values()))
     width = max(max(taps) - min(taps) + 1 for taps in rows)
     # Near the far edge the window of taps is moved back inside; the freed taps weigh nothing.
     start = np.array([min(min(taps), n_in - width) for taps in rows], np.int64)
     weights = np.zeros((n_out, width), np.int64)
     for out, taps in enumerate(rows):
         for index, weight in taps.items():
-            weights[out, index - start[out]] = int(weight * total)
-    return AxisMap(start, weights, total)
+            weights[out, index - start[out]] = weight // common
+    return AxisMap(start, weights, total // common)
 
 
-def _area(n_in: int, n_out: int) -> list[Taps]:
-    """Each output is the mean over its share of the inputs."""
-    step = Fraction(n_in, n_out)
+def _area(n_in: int, n_out: int) -> tuple[list[Taps], int]:
+    """Each output is the mean over its share of the inputs; with what an output's weights sum to.
+
+    An input is `n_out` long, an output `n_in`.
+    """
     rows = []
     for out in range(n_out):
-        left, right = out * step, (out + 1) * step
-        inputs = range(math.floor(left), math.ceil(right))
-        rows.append({i: (min(right, Fraction(i + 1)) - max(left, Fraction(i))) / step for i in inputs})
-    return rows
+        left, right = out * n_in, (out + 1) * n_in
+        inputs = range(left // n_out, -(-right // n_out))
+        rows.append({i: min(right, (i + 1) * n_out) - max(left, i * n_out) for i in inputs})
+    return rows, n_in
 
 
-def _linear(n_in: int, n_out: int) -> list[Taps]:
-    """Each output is interpolated between the two inputs beside its centre; ends are held."""
-    rows = []
+def _linear(n_in: int, n_out: int) -> tuple[list[Taps], int]:
+    """Each output is interpolated between the two inputs beside its centre; ends are held. The sum as above.
+
+    Between two inputs lie 2 `n_out` steps.
+    """
+    step, rows = 2 * n_out, []
     for out in range(n_out):
-        centre = Fraction(2 * out + 1, 2) * Fraction(n_in, n_out) - Fraction(1, 2)
-        centre = min(max(centre, Fraction(0)), Fraction(n_in - 1))
-        left = math.floor(centre)
-        taps = {left: 1 - (centre - left), left + 1: centre - left}
-        rows.append({index: weight for index, weight in taps.items() if weight})
-    return rows
+        centre = min(max((2 * out + 1) * n_in - n_out, 0), (n_in - 1) * step)
+        left, part = divmod(centre, step)
+        rows.append({left: step - part, left + 1: part} if part else {left: step})
+    return rows, step
 
 
 def _blurred(taps: Taps, n_in: int) -> Taps:
@@ -80,7 +86,7 @@ def _blurred(taps: Taps, n_in: int) -> Taps:
     for index, weight in taps.items():
         for shift, share in zip((-1, 0, 1), BLUR, strict=True):
             source = _mirrored(index + shift, n_in)
-            spread[source] = spread.get(source, Fraction(0)) + weight * share
+            spread[source] = spread.get(source, 0) + weight * share
     return spread
 
 

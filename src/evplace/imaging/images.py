@@ -19,7 +19,7 @@ from evplace.core.compiled import njit
 from evplace.core.errors import SettingsError, TraverseError
 from evplace.core.events import Events, Size
 from evplace.imaging._resampling import Resampler, Resize, axis_map
-from evplace.imaging.representations import Representation
+from evplace.imaging.representations import Representation, grid_of
 from evplace.imaging.tones import Tone, toned
 
 MOST = {"width": 1 << 13, "height": 1 << 13, "saturation": 1 << 31, "tau_ms": 1e9, "bins": 1 << 8}
@@ -94,6 +94,11 @@ class Imager:
         self._grid = _representation(size, self.settings)
         self._resampler = _resampler(size, self.settings, self.settings.blur and not self.settings.blur_last)
         self._blur = _blur_of_images(self.settings)
+
+    @property
+    def grid(self) -> NDArray[Any] | None:
+        """What readers may mark in place of `add`: see `grid_of` of the representations."""
+        return grid_of(self._grid)
 
     def add(self, events: Events) -> None:
         """Take events of the open window.

@@ -101,6 +101,15 @@ class TimeWindows:
             yield events[start:stop], (self._close() if stop < len(events) else None)
             start = stop
 
+    @property
+    def end_us(self) -> int | None:
+        """The last microsecond of the open window; None before the first event, which says where it is."""
+        return None if self._origin_us is None else self._end_us(self._open)
+
+    def add(self, events: int) -> None:
+        """So many more events in the open window, none of them after `end_us`."""
+        self._events += events
+
     def tick(self, t_us: int) -> Iterator[Window]:
         """The windows that are over once no event up to `t_us` will come any more, with their events.
 

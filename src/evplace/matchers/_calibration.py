@@ -7,7 +7,7 @@ what the two layers then say of images from there is what they will say of place
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,19 +46,42 @@ MOST_IMAGES = 3000
 """Of the map's own, that are localised on it: the first ones of a longer map."""
 
 
+class Strangers(NamedTuple):
+    """What the two layers make of a map's images whose places are cut out."""
+
+    learned: Learned
+    """What the first layer learns of the map."""
+    live: Floats
+    """(unknown, features) what the second one sees of them, live."""
+    late: Floats
+    """(unknown, features) and when what comes later is known."""
+
+
 def measured(route: Route, rows: Callable[[slice], Rows]) -> Learned:
     """What `Bayes` learns; nothing from a map too short or too small to be measured."""
+    found = strangers(route, rows)
+    if found is None:
+        return {}
+    return {
+        **found.learned,
+        LIVE: np.sort(probability(found.live)),
+        LATE: np.sort(probability(found.late)),
+    }
+
+
+def strangers(route: Route, rows: Callable[[slice], Rows]) -> Strangers | None:
+    """Localise a map's images on what is left of it; None for a map too short or too small for that."""
     ways = Ways.of(route)
     items = len(ways.way)
     if items < LEAST_ITEMS or ways.way[-1] < SHORTEST_M:
-        return {}
+        return None
     queries = min(items, MOST_IMAGES)
     own = np.array(rows(slice(0, queries)), np.float32)
     own[np.arange(queries), np.arange(queries)] = own.min(axis=1)  # an image tells nothing of itself
     learned = {WRONG: _wrong(ways, own), CONTENT: np.array([route.content])}
     unknown = [_trial(route, own, learned, keep) for keep in _cuts(ways)]
-    live, late = (np.sort(np.concatenate(column)) for column in zip(*unknown, strict=True))
-    return {} if len(live) < LEAST_UNKNOWN else learned | {LIVE: live, LATE: late}
+    live, late = (np.concatenate(column) for column in zip(*unknown, strict=True))
+    return None if len(live) < LEAST_UNKNOWN else Strangers(learned, live, late)
 
 
 def _wrong(ways: Ways, own: Rows) -> Floats:
@@ -83,14 +106,14 @@ def _cuts(ways: Ways) -> Iterator[Bools]:
 
 
 def _trial(route: Route, own: Rows, learned: Learned, keep: Bools) -> tuple[Floats, Floats]:
-    """(unknown,) what is said, live and late, of those of a map's images whose places are cut out."""
+    """(unknown, features) live and late, of those of a map's images whose places are cut out."""
     whole, part = Ways.of(route), Ways.of(_part(route, keep))
     seen, rows = _driven(whole, len(own)), own[:, keep]
     unknown = np.array([not _near(whole, keep, query) for query in range(len(own))])
     live, late = traces.live(part, rows, seen, learned), traces.late(part, rows, seen, learned)
     return (
-        probability(of_drive(live.signs, live.weight, late=False))[unknown],
-        probability(of_drive(late.signs, late.weight, late=True))[unknown],
+        of_drive(live.signs, live.weight, late=False)[unknown],
+        of_drive(late.signs, late.weight, late=True)[unknown],
     )
 
 

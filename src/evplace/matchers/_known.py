@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.compiled import njit
-from evplace.matchers._known_weights import LATE, LIVE
+from evplace.matchers._known_weights import ELSEWHERE, LATE, LIVE
 
 Floats = NDArray[np.float64]
 
@@ -22,6 +22,8 @@ SPANS = np.array([1e-3, 4.0, 12.0])
 """Over how many images, at ten a second and while the camera moves, each sign is averaged."""
 LONGER = np.array([sign * len(SPANS) + span for sign in range(SIGNS) for span in range(1, len(SPANS))])
 """Where the means over the longer spans stand."""
+SHARES = np.array([0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5])
+"""Shares of false accepts for which it is known what probability they take on drives through those towns."""
 LEAST_AHEAD = 0.5
 """Images that must be ahead, by their weights, for these to have a mean."""
 
@@ -90,6 +92,23 @@ def of_drive(signs: Floats, weights: Floats, late: bool) -> Floats:
     """(n, features) what the weights are of, for all answers (n, SIGNS) of a drive."""
     before = means_of(signs, weights, SPANS)
     return joined(before, means_ahead(signs, weights)) if late else before
+
+
+def threshold(unknown: Floats, share: float, late: bool) -> float:
+    """What a probability must be above, so that no more than `share` of what was never seen is accepted.
+
+    Live, that is what a map tells of itself: the probabilities (unknown,) at places cut out. When what comes
+    later is known, these vary too much from map to map, so that it is halfway, by the odds, to what it takes
+    on drives through other towns.
+    """
+    own = float(np.quantile(unknown, 1 - share))
+    return halfway(own, float(np.interp(np.log(share), np.log(SHARES), ELSEWHERE))) if late else own
+
+
+def halfway(one: float, other: float) -> float:
+    """The probability whose odds are the geometric mean of those of two others."""
+    logits = [np.log(p) - np.log1p(-p) for p in np.clip([one, other], 1e-6, 1 - 1e-6)]
+    return float(1 / (1 + np.exp(-np.mean(logits))))
 
 
 def probability(features: Floats) -> Floats:

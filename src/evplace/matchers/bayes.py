@@ -41,7 +41,7 @@ from evplace.matchers._answering import Found, Reader
 from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
 from evplace.matchers._calibration import LATE, LIVE, checked, measured
 from evplace.matchers._kept import Kept, after, live_rows
-from evplace.matchers._known import Means, joined, means_ahead, of_drive, probability
+from evplace.matchers._known import Means, joined, means_ahead, of_drive, probability, threshold
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
 from evplace.matchers._ways import Ways
@@ -105,7 +105,9 @@ class Bayes:
         if self.threshold is not None:
             return self.threshold
         unknown = (route.learned or {}).get(kind)
-        return -1.0 if unknown is None else max(float(np.quantile(unknown, 1 - self.false_accept)), LEAST)
+        if unknown is None:
+            return -1.0
+        return max(threshold(unknown, self.false_accept, late=kind == LATE), LEAST)
 
 
 Bayes.presets = {"best": Bayes()}

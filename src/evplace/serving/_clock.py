@@ -27,8 +27,9 @@ class Sifted:
 class Sieve:
     """Lets through events inside the sensor and in the order of their times, as a recording's reader does.
 
-    A block that lies off by more than LEAP_US waits for the next: where that agrees with it, the clock was
-    set or the camera started again, and times begin anew; else it was noise, and is dropped.
+    A block that lies off by more than LEAP_US, or goes back at all after so long a silence, waits for the
+    next: where that agrees with it, the clock was set or the camera started again, and times begin anew;
+    else it was noise, and is dropped.
     """
 
     def __init__(self, size: Size) -> None:
@@ -70,7 +71,8 @@ class Sieve:
             return False
         ahead_us = t_us - self._last_us
         passed_us = (now_s - self._last_s) * pace * 1e6
-        return ahead_us < -LEAP_US or (pace > 0 and ahead_us > passed_us + LEAP_US)
+        is_back = ahead_us < -LEAP_US or (ahead_us < 0 and passed_us > LEAP_US)
+        return is_back or (pace > 0 and ahead_us > passed_us + LEAP_US)
 
     def _drop_doubtful(self) -> None:
         if self._doubtful is not None:
@@ -78,10 +80,12 @@ class Sieve:
             self._doubtful = None
 
     def _passed(self, blocks: list[Block], now_s: float, anew: bool = False) -> Sifted:
-        self._last_s = now_s
         held = [] if self._held is None else [self._held]
         self._held = None
-        return Sifted(self._kept(joined([*held, *blocks]), final=False), anew)
+        kept = self._kept(joined([*held, *blocks]), final=False)
+        if kept:  # else all is held back, and the last time that is known is still that of before
+            self._last_s = now_s
+        return Sifted(kept, anew)
 
     def _kept(self, block: Block, final: bool) -> list[Block]:
         good, self._held, drops = checked(block, self.size, self._last_us, final)

@@ -1,7 +1,8 @@
 """Drive: takes packets from a feed, localises them, and closes windows by the clock where no event comes.
 
-The time by the sensor's clock is told from the last events: what has passed since they came, less GRACE_S for
-what may be on its way. Events that come later still are left out, and counted.
+The time by the sensor's clock is told from the last events: what has passed between their coming and the
+last time that the source said that nothing came, less GRACE_S for what may be on its way. Events that come
+later still are left out, and counted.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ class Drive:
 
     def _tick(self) -> None:
         """Close the windows that are over by the clock."""
-        now_s, pace = time.monotonic(), self.feed.pace
+        now_s, pace = max(self._clock_s, self.feed.quiet_s), self.feed.pace
         if self._clock_us is None or pace <= 0:
             self._clock_s = now_s
             return

@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from evplace.core.errors import EvplaceError
+from evplace.core.errors import EvplaceError, RecordingError
 from evplace.core.events import Events, Size
 from evplace.serving._clock import Sieve
 from evplace.serving._recorder import Recorder
@@ -69,6 +69,8 @@ class Feed:
         """Whether nothing more comes, though some may still be held."""
         self.last_s = time.monotonic()
         """When the last events came."""
+        self.quiet_s = self.last_s
+        """Until when the source has said that nothing came: a busy machine is not a silent camera."""
         self._sieve, self._recorder, self._hold = Sieve(size), recorder, hold
         self._counters = Counters()
         self._waits = Facts.of(source).waits
@@ -141,9 +143,11 @@ class Feed:
 
     def _push(self, item: object) -> None:
         if item is None:
+            self.quiet_s = time.monotonic()
             self._put(self._sieve.flush().blocks)
         elif isinstance(item, Block):
             self.last_s = time.monotonic()
+            check_size(self.size, getattr(self.source, "size", None))
             found = self._sieve.push(item, self.last_s, self.pace)
             self._anew = self._anew or found.anew
             self._put(found.blocks)
@@ -184,4 +188,13 @@ class Feed:
     def _is_full(self, packet: Packet) -> bool:
         return bool(self._packets) and (
             self._counters.backlog + len(packet.events) > self._hold or len(self._packets) >= PACKETS
+        )
+
+
+def check_size(wanted: Size | None, given: Size | None) -> None:
+    """RecordingError where a map and a source have two sensors; a stream may say its own only as it comes."""
+    if wanted is not None and given is not None and tuple(wanted) != tuple(given):
+        raise RecordingError(
+            f"the map was made with a sensor of {wanted[0]}x{wanted[1]} pixels, this source has "
+            f"{given[0]}x{given[1]}: give the map's own sensor, or train a map with this one"
         )

@@ -20,7 +20,7 @@ from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 from evplace.placemap._files import SUMS
 from evplace.serving._drive import Drive
-from evplace.serving._feed import Feed
+from evplace.serving._feed import Feed, check_size
 from evplace.serving._hub import Hub, grey
 from evplace.serving._recorder import Recorder
 from evplace.serving._report import Describer, Report, counted, epsg
@@ -176,12 +176,11 @@ def sensor_of(place_map: PlaceMap, source: Live) -> tuple[int, int]:
     recipe = place_map.recipe
     wanted = None if recipe is None else recipe.size
     given = Facts.of(source).size
-    if wanted is not None and given is not None and tuple(wanted) != tuple(given):
+    try:
+        check_size(wanted, given)
+    except RecordingError:
         source.close()
-        raise RecordingError(
-            f"the map was made with a sensor of {wanted[0]}x{wanted[1]} pixels, this source has "
-            f"{given[0]}x{given[1]}: give the map's own sensor, or train a map with this one"
-        )
+        raise
     size = wanted or given
     if size is None:
         source.close()

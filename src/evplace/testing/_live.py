@@ -15,6 +15,8 @@ from evplace.testing._require import check_settings, require
 
 ITEMS = 1000
 """Items that are looked at, at most."""
+QUIET = 20
+"""Items one after another that say that nothing came, after which no more events are waited for."""
 END_S = 60.0
 """Seconds within which a source that was closed must end; a busy machine is slow."""
 FIELDS = tuple(map(np.dtype, (np.int64, np.uint16, np.uint16, np.bool_)))
@@ -44,7 +46,8 @@ def _some(items: Any, who: str) -> list[Item]:
     found: list[Item] = []
     for item in items:
         found.append(item)
-        if len(found) >= ITEMS or sum(isinstance(one, Block) for one in found) >= 3:
+        blocks = sum(isinstance(one, Block) for one in found)
+        if len(found) >= ITEMS or blocks >= 3 or (blocks and found[-QUIET:] == [None] * QUIET):
             break
     require(found, f"{who} must give something")
     items.close()

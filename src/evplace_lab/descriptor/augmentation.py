@@ -8,6 +8,8 @@ from torch.nn.functional import affine_grid, avg_pool2d, grid_sample
 
 SHIFT, TURN, ZOOM = (0.1, 0.09), 0.035, 0.08
 """Largest shift across and down in half images, turn in radians, and change of size."""
+NOISE, UNDER = 0.25, 4
+"""Largest share of a sensor's pixels that noise lights, and how many of them lie under one of the image."""
 HIDDEN = 0.4
 """Share of images with something in front: a block without events, or full of them."""
 
@@ -18,13 +20,25 @@ def augmented(images: Tensor) -> Tensor:
     x = x * (torch.rand(x.shape) >= 0.35 * _for_some(x, 0.5))
     noise = 0.08 * _for_some(x, 0.5) ** 2
     x = torch.maximum(x, (torch.rand(x.shape) < noise) * (40 + 60 * torch.rand(x.shape)))
-    x = torch.lerp(x, avg_pool2d(x[:, None], 3, 1, 1)[:, 0], _for_some(x, 0.3))
+    x = x + (255 - x) * _noise(x)
+    x = torch.lerp(x, _smoothed(x), _for_some(x, 0.3))
     return _hidden(x * (0.6 + 0.8 * torch.rand(len(x), 1, 1))).clamp_(0, 255)
 
 
 def _for_some(x: Tensor, share: float) -> Tensor:
     """(n, 1, 1): a number from 0 to 1 for a share of the images, 0 for the others."""
     return torch.rand(len(x), 1, 1) * (torch.rand(len(x), 1, 1) < share)
+
+
+def _noise(x: Tensor) -> Tensor:
+    """Share of each pixel that a sensor's noise lights in the dark, where it lights pixels everywhere."""
+    share = (NOISE * _for_some(x, 0.4)).expand(x.shape)
+    lit = torch.binomial(torch.full_like(share, UNDER), share) / UNDER
+    return torch.lerp(lit, _smoothed(lit), torch.rand(len(x), 1, 1))
+
+
+def _smoothed(x: Tensor) -> Tensor:
+    return avg_pool2d(x[:, None], 3, 1, 1)[:, 0]
 
 
 def _moved(x: Tensor) -> Tensor:

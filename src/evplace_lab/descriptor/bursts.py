@@ -19,7 +19,7 @@ from evplace_lab.city.film import Film
 from evplace_lab.city.town import build_town
 from evplace_lab.descriptor.cameras import Camera, Carrying, draw_camera, draw_carrying
 from evplace_lab.descriptor.halls import HallFilm, build_hall
-from evplace_lab.descriptor.sensors import SIZE, Sensor, draw_sensor
+from evplace_lab.descriptor.sensors import FROM_FRAMES, SIZE, Sensor, draw_kind, draw_sensor
 
 FIRST_SEED = 10_000
 """Towns of lower seeds are for trials and for the benchmark, whose seed is 0."""
@@ -46,6 +46,8 @@ class BurstSettings:
     """Metres between two of them."""
     hall_every: int = 4
     """Each so manieth seed is a hall a route in place of a town; 0 for none."""
+    frames: bool = False
+    """Frames of an ordinary camera alone, in place of what all sensors give."""
 
 
 class Bursts(NamedTuple):
@@ -114,7 +116,7 @@ def _streets(seed: int, settings: BurstSettings, rng: np.random.Generator) -> It
     town = build_town(seed)
     length = settings.places * settings.step_m
     for path in range(FIRST_PATH, FIRST_PATH + settings.routes):
-        camera, sensors = _seen_by(rng, indoors=False)
+        camera, sensors = _seen_by(rng, settings, indoors=False)
         drives = []
         for name in _conditions(settings.drives, rng):
             film = Film(town, path, name, camera.size, seed, length + 30, camera.field_deg)
@@ -126,7 +128,7 @@ def _streets(seed: int, settings: BurstSettings, rng: np.random.Generator) -> It
 
 def _halls(_: int, settings: BurstSettings, rng: np.random.Generator) -> Iterator[_Route]:
     for _ in range(settings.routes):
-        hall, (camera, sensors) = build_hall(rng), _seen_by(rng, indoors=True)
+        hall, (camera, sensors) = build_hall(rng), _seen_by(rng, settings, indoors=True)
         drives = []
         for number in range(settings.drives):
             film = HallFilm(hall, number % 2 == 1, camera.size, camera.field_deg, rng)
@@ -142,10 +144,11 @@ def _conditions(count: int, rng: np.random.Generator) -> list[str]:
     return ["day", "night", *map(str, rng.choice(names, count - 2, replace=False, p=shares))][:count]
 
 
-def _seen_by(rng: np.random.Generator, indoors: bool) -> tuple[Camera, list[Sensor]]:
+def _seen_by(rng: np.random.Generator, settings: BurstSettings, indoors: bool) -> tuple[Camera, list[Sensor]]:
     """The camera of a route, and its sensors: a map and its queries are made by one."""
     camera = draw_camera(rng, indoors)
-    return camera, [draw_sensor(rng, camera.size, camera.crop_bottom) for _ in range(SENSORS)]
+    kinds = (draw_kind(rng, settings.frames) for _ in range(SENSORS))
+    return camera, [draw_sensor(rng, kind, camera.size, camera.crop_bottom) for kind in kinds]
 
 
 def _drive(
@@ -159,8 +162,11 @@ def _drive(
     """Images (places, sensors, 45, 80) and poses (places, 3) of one drive."""
     images = np.empty((len(ways), SENSORS, SIZE[1], SIZE[0]), np.uint8)
     poses = np.empty((len(ways), 3))
+    events = any(sensor.kind not in FROM_FRAMES for sensor in sensors)
     for place, way_m in enumerate(ways):
-        frames, times_us = _burst(scenery, camera, carrying, float(way_m), rng)
+        frames, times_us = _burst(
+            scenery, camera, carrying, float(way_m), rng, 0 if events else camera.frames
+        )
         for k, sensor in enumerate(sensors):
             images[place, k] = sensor.image(frames, times_us, int(rng.integers(1 << 30)))
         pose = scenery.pose_at(float(way_m))
@@ -169,12 +175,12 @@ def _drive(
 
 
 def _burst(
-    scenery: _Scenery, camera: Camera, carrying: Carrying, way_m: float, rng: np.random.Generator
+    scenery: _Scenery, camera: Camera, carrying: Carrying, way_m: float, rng: np.random.Generator, first: int
 ) -> tuple[list[NDArray[np.float32]], list[int]]:
-    """The frames of the window that ends at a place, and their times in microseconds."""
+    """The frames from number `first` of the window that ends at a place, and their times in microseconds."""
     turning = rng.normal(0, carrying.shake, 3)
     frames, times_us = [], []
-    for k in range(camera.frames + 1):
+    for k in range(first, camera.frames + 1):
         before_s = camera.window_s * (1 - k / camera.frames)
         pose = scenery.pose_at(way_m - carrying.speed * before_s)
         moved = carrying.pose(pose, camera, turning * (0.02 - before_s))

@@ -23,7 +23,7 @@ from evplace.scorers.trained import ABOUT, WEIGHTS, DescriptorGraph
 from evplace_lab.descriptor.bursts import Bursts, BurstSettings, is_hall
 from evplace_lab.descriptor.judging import recalls
 
-VERSION = 1
+VERSION = 2
 """Counts up whenever the same settings give other images or other weights."""
 UNSEEN = (201, 202, 203)
 """Seeds of two towns and of halls that no training sees."""
@@ -35,11 +35,11 @@ Progress = Callable[[int, int, str], None]
 class Recipe:
     """What the shipped weights were made with."""
 
-    towns: int = 24
+    towns: int = 48
     """Seeds of towns and halls to train on, from 0."""
     bursts: BurstSettings = field(default_factory=BurstSettings)
     """How much is made of each."""
-    steps: int = 3000
+    steps: int = 7000
     """Steps of each training."""
 
     @property

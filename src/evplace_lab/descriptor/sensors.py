@@ -89,9 +89,14 @@ def _halved(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return halved
 
 
-def draw_sensor(rng: np.random.Generator, size: Size, crop_bottom: float) -> Sensor:
-    """A sensor of `size` for one route."""
+def draw_kind(rng: np.random.Generator, frames: bool) -> Kind:
+    """The kind of a route's sensor; `frames` leaves nothing but these."""
     kind = list(SHARES)[int(rng.choice(len(SHARES), p=list(SHARES.values())))]
+    return "frame" if frames else kind
+
+
+def draw_sensor(rng: np.random.Generator, kind: Kind, size: Size, crop_bottom: float) -> Sensor:
+    """A sensor of `size` for one route."""
     scale = 2 if kind in FROM_FRAMES else 1  # edges are found before an image is small
     images = ImageSettings(
         representation="count" if kind != "ideal" and rng.random() < 0.3 else "binary",

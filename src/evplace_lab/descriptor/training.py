@@ -37,11 +37,11 @@ WARMING = 0.1
 class TrainingSettings:
     """How the network is trained."""
 
-    steps: int = 3000
+    steps: int = 7000
     """Steps of one batch each."""
-    routes: int = 4
+    routes: int = 8
     """Routes in a batch."""
-    places: int = 16
+    places: int = 8
     """Places of each route, each in every drive."""
     learning_rate: float = 0.002
     """Its largest value; it rises and falls once (AdamW)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,6 +55,22 @@ def test_a_metre_in_a_hall_counts_for_many(hall: Bursts, monkeypatch: pytest.Mon
     plain = make_bursts(HALL, TINY)
     np.testing.assert_allclose(hall.poses[..., :2], HALL_METRE * plain.poses[..., :2], rtol=1e-5)
     np.testing.assert_array_equal(hall.poses[..., 2], plain.poses[..., 2])
+
+
+def test_frames_alone_are_the_last_ones_of_their_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing else is rendered, and the images are the same as with all frames of the windows."""
+    asked: list[int] = []
+    whole = bursts._burst
+
+    def counted(*args: Any) -> tuple[list[Any], list[int]]:
+        asked.append(args[-1])
+        return whole(*args[:-1], 0)
+
+    few = dataclasses.replace(TINY, routes=1, frames=True)
+    made = make_bursts(TOWN, few)
+    monkeypatch.setattr(bursts, "_burst", counted)
+    np.testing.assert_array_equal(made.images, make_bursts(TOWN, few).images)
+    assert min(asked) > 0
 
 
 def test_each_fourth_seed_is_halls() -> None:

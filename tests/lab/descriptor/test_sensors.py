@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evplace.imaging.images import Imager, ImageSettings
 from evplace.sources.simulators.esim import PRESETS, SensorSettings
-from evplace_lab.descriptor.sensors import FROM_FRAMES, SHARES, Sensor, draw_sensor
+from evplace_lab.descriptor.sensors import FROM_FRAMES, SHARES, Sensor, draw_kind, draw_sensor
 
 SIZE = (96, 72)
 TIMES = [0, 20_000, 40_000]
@@ -79,7 +79,8 @@ def test_the_seed_draws_all_noise() -> None:
 
 def test_every_kind_is_drawn() -> None:
     rng = np.random.default_rng(0)
-    drawn = [draw_sensor(rng, SIZE, 0.25) for _ in range(80)]
+    drawn = [draw_sensor(rng, draw_kind(rng, frames=False), SIZE, 0.25) for _ in range(80)]
+    assert {draw_kind(rng, frames=True) for _ in range(20)} == {"frame"}
     assert {one.kind for one in drawn} == set(SHARES)
     assert {one.imager.settings.representation for one in drawn} == {"binary", "count"}
     assert all(one.imager.settings.tone == "edges" for one in drawn if one.kind == "edges")

@@ -12,7 +12,7 @@ torch = pytest.importorskip("torch", reason="the network needs the extra 'train'
 
 from evplace.scorers import Learning  # noqa: E402
 from evplace.scorers._network import checkpoint  # noqa: E402
-from evplace_lab.descriptor.augmentation import augmented  # noqa: E402
+from evplace_lab.descriptor.augmentation import NOISE, _noise, augmented  # noqa: E402
 from evplace_lab.descriptor.batches import Batch, draw_batch  # noqa: E402
 from evplace_lab.descriptor.bursts import Bursts  # noqa: E402
 from evplace_lab.descriptor.training import (  # noqa: E402
@@ -50,6 +50,13 @@ def test_a_batch_has_each_place_in_every_drive(towns: list[Bursts]) -> None:
     batch = draw_batch(towns, 0, 0, 2, 3)
     assert batch.images.shape == (2 * 3 * 3, 45, 80)
     assert batch.route.tolist() == [0] * 9 + [1] * 9
+
+
+def test_noise_lights_a_share_of_the_dark_in_some_images() -> None:
+    torch.manual_seed(2)
+    lit = _noise(torch.zeros(200, 45, 80)).mean((1, 2))
+    assert 0.25 < float((lit > 0.001).float().mean()) < 0.55
+    assert 0.1 < float(lit.max()) < NOISE + 0.02
 
 
 def test_augmented_images_are_others_in_the_same_range() -> None:

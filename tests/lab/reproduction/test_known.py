@@ -28,12 +28,27 @@ def test_the_weights_are_found_that_the_answers_follow() -> None:
 
 def test_a_town_is_judged_by_the_weights_of_the_others() -> None:
     drives = [drive(1, 0, [0.0, 2.0, 0.0]), drive(2, 1, [0.0, -2.0, 0.0])]
-    (row,) = known._judged(drives, 1)
-    assert (row["town"], row["query"]) == (1, "night-1")
+    features = np.random.default_rng(2).standard_normal((5000, 2)) * [1.0, 3.0] + [0.5, -2.0]
+    own = known.Own(1, "ideal", {"live": features, "late": features})
+    (row,) = known._judged(drives, [own], 1)
+    assert (row["town"], row["sensor"], row["query"]) == (1, "ideal", "night-1")
+    weights = known._fitted(drives[1:], "live")
+    assert weights[1] < 0  # the other town's weights point the other way
     one = drives[0].answers
-    accepted = (known._fitted(drives[1:], "live")[1:] @ one.features["live"].T) > 0
-    assert row["live"]["accuracy"] < 50  # the other town's weights point the other way
-    assert row["live"]["false_accepts"] == pytest.approx(100 * accepted[~one.known].mean(), abs=2)
+    said = known._said(one.features["live"], weights)
+    limit = np.quantile(known._said(features, weights), 0.99)
+    accepted = said > limit
+    good = np.where(one.known, one.right["live"] & accepted, ~accepted)
+    assert row["live"]["the map"]["accuracy"] == pytest.approx(100 * good.mean())
+    assert row["live"]["the map"]["false_accepts"] == pytest.approx(100 * accepted[~one.known].mean())
+    assert row["live"]["the map"]["false_accepts"] == pytest.approx(1, abs=0.5)
+
+
+def test_halfway_lies_between_the_map_and_other_towns() -> None:
+    drives = [drive(1, 0, [0.0, 2.0, 0.0]), drive(2, 1, [0.0, 2.0, 0.0])]
+    sure = known.Own(1, "ideal", dict.fromkeys(known.KINDS, np.full((200, 2), 3.0)))
+    limits = known._thresholds(sure, drives[1:], "late", known._fitted(drives[1:], "late"))
+    assert limits["other towns"] < limits["halfway"] < limits["the map"]
 
 
 def test_settings_of_a_training_mean_nothing(tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from evplace.sources.live.udp import UDP, Listening
 from evplace.sources.readers import Block, open_recording
 from evplace.sources.writers import write_recording
 from evplace.testing import check_live
-from made_streams import faery_datagrams, packed
+from made_streams import as_bytes, datagrams, packed
 
 SIZE = (80, 60)
 
@@ -146,40 +146,13 @@ def test_a_damaged_recording_gives_its_good_part(drive: Events, tmp_path: Path) 
 FORMATS: dict[str, bytes] = {}
 
 
-def as_bytes(format: str, drive: Events, folder: Path) -> bytes:
-    """A drive as a stream holds it."""
-    if format == "evt3":
-        path = folder / "stream.raw"
-        write_recording(path, [drive], SIZE, overwrite=True)
-        return path.read_bytes()
-    if format == "evt2":
-        return evt2(drive)
-    if format == "packed":
-        return packed(drive)
-    lines = zip(drive.t_us, drive.x, drive.y, drive.p, strict=True)
-    return b"".join(b"%d %d %d %d\n" % (t, x, y, p) for t, x, y, p in lines)
-
-
-def evt2(events: Events) -> bytes:
-    words: list[int] = []
-    high = None
-    for t, x, y, p in zip(
-        events.t_us.tolist(), events.x.tolist(), events.y.tolist(), events.p.tolist(), strict=True
-    ):
-        if t >> 6 != high:
-            high = t >> 6
-            words.append(0x8 << 28 | high)
-        words.append(int(p) << 28 | (t & 0x3F) << 22 | x << 11 | y)
-    return b"% evt 2.0\n% geometry 80x60\n% end\n" + np.array(words, "<u4").tobytes()
-
-
 @pytest.mark.parametrize("format", ["evt3", "evt2", "packed", "text"])
 @settings(max_examples=10)
 @given(cuts=st.lists(st.integers(0, 100_000), max_size=20))
 def test_bytes_in_parts_of_any_length_are_the_same_events(
     format: str, cuts: list[int], drive: Events, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    data = FORMATS.setdefault(format, as_bytes(format, drive, tmp_path_factory.getbasetemp()))
+    data = FORMATS.setdefault(format, as_bytes(format, drive))
     stream = ByteStream("packed" if format == "packed" else None)
     edges = [0, *sorted(min(cut, len(data)) for cut in cuts), len(data)]
     found: list[Item] = []
@@ -206,7 +179,7 @@ def test_a_pipe_is_read_to_its_end(drive: Events, tmp_path: Path) -> None:
 
     def write() -> None:
         with io.FileIO(writing, "w") as pipe:
-            data = as_bytes("evt3", drive, tmp_path)
+            data = as_bytes("evt3", drive)
             while data:
                 data = data[pipe.write(data) :]
 
@@ -219,7 +192,7 @@ def test_a_pipe_is_read_to_its_end(drive: Events, tmp_path: Path) -> None:
 
 def test_a_file_is_read_as_it_grows_and_anew_when_replaced(drive: Events, tmp_path: Path) -> None:
     path = tmp_path / "grows.raw"
-    data = as_bytes("evt3", drive, tmp_path)
+    data = as_bytes("evt3", drive)
     live = open_live(f"tail:{path}")
     assert "is waited for" in Facts.of(live).notes[0]
     items = live.blocks()
@@ -252,30 +225,11 @@ def sent(live: Live, datagrams: list[bytes]) -> None:
             sender.sendto(data, ("127.0.0.1", live.port))
 
 
-def faery_32_datagrams(events: Events) -> list[bytes]:
-    table = np.zeros(len(events), [("t", "<u4"), ("x", "<u2"), ("y", "<u2")])
-    table["t"], table["x"], table["y"] = events.t_us & 0xFFFFFFFF, events.x, events.y << 1 | events.p
-    return [table[at : at + 100].tobytes() for at in range(0, len(events), 100)]
-
-
-def spif_datagrams(events: Events, order: str) -> list[bytes]:
-    words = np.zeros((len(events), 2), f"{order}u4")
-    words[:, 0] = events.x.astype(np.uint32) << 16 | events.p.astype(np.uint32) << 15 | events.y
-    words[:, 1] = events.t_us
-    return [words[at : at + 100].tobytes() for at in range(0, len(events), 100)]
-
-
 @pytest.mark.parametrize("layout", ["faery", "faery-32", "spif", "spif-be"])
 def test_packets_of_each_layout_are_the_events(layout: str, drive: Events) -> None:
     events = drive[:3000]
-    datagrams = {
-        "faery": faery_datagrams,
-        "faery-32": faery_32_datagrams,
-        "spif": lambda events: spif_datagrams(events, "<"),
-        "spif-be": lambda events: spif_datagrams(events, ">"),
-    }[layout](events)
     live = open_live("udp:0", SIZE, layout=layout)
-    sent(live, datagrams)
+    sent(live, datagrams(layout, events))
     same(joined(until(live, len(events))), events)
 
 

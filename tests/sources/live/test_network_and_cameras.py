@@ -7,10 +7,8 @@ import struct
 import subprocess
 import sys
 import time
-import types
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,11 +17,10 @@ import pytest
 from conftest import HANG_S, make_drive
 from evplace.core.errors import MissingExtraError, RecordingError
 from evplace.core.events import Events
-from evplace.serving.ros import Cdr
 from evplace.sources.live import ANEW, Facts, Item, Live, open_live
 from evplace.sources.live.zenoh import GID, Subscribed, attachment, leave, session
 from evplace.sources.readers import Block
-from evplace.sources.writers.evt3 import write as write_evt3
+from made_streams import Camera, libcaer, message, mono, packet, ros_messages
 
 SIZE = (80, 60)
 
@@ -124,50 +121,16 @@ needs_zenoh = pytest.mark.skipif(
 KEY = "0/event_camera/events/event_camera_msgs::msg::dds_::EventPacket_/RIHS01_made"
 
 
-def message(encoding: str, events: bytes, stamp_ns: int, base_ns: int, size: tuple[int, int] = SIZE) -> bytes:
-    """An EventPacket as ROS 2 serialises it."""
-    cdr = Cdr().header(stamp_ns, "camera").put("I", size[1], size[0]).put("Q", 0, base_ns)
-    cdr.text(encoding).put("B", 0).put("I", len(events))
-    return cdr.message() + events
-
-
-def evt3_packets(drive: Events, folder: Any) -> list[bytes]:
-    """The words of a drive, cut anywhere, as a camera's clock goes on from packet to packet."""
-    path = folder / "packet.raw"
-    write_evt3(path, [drive], SIZE)
-    words = path.read_bytes().partition(b"% end\n")[2]
-    return [words[at : at + 5000] for at in range(0, len(words), 5000)]
-
-
-def mono(events: Events) -> bytes:
-    words = events.t_us.astype(np.uint64) * np.uint64(1000)
-    words |= events.x.astype(np.uint64) << np.uint64(32) | events.y.astype(np.uint64) << np.uint64(48)
-    return bytes((words | events.p.astype(np.uint64) << np.uint64(63)).astype("<u8").tobytes())
-
-
-def libcaer(events: Events) -> bytes:
-    words = np.zeros((len(events), 2), "<u4")
-    words[:, 0] = events.x.astype(np.uint32) << 17 | events.y.astype(np.uint32) << 2 | events.p << 1 | 1
-    words[:, 1] = events.t_us
-    return words.tobytes()
-
-
-def libcaer_cmp(events: Events) -> bytes:
-    words: list[int] = []
-    columns = (events.t_us.tolist(), events.x.tolist(), events.y.tolist(), events.p.tolist())
-    for t, x, y, p in zip(*columns, strict=True):
-        words += [0x0000 | t >> 12, 0x1000 | t & 0xFFF, 0x2000 | x, 0x3000 | int(p) << 11 | y]
-    return np.array(words, "<u2").tobytes()
-
-
 @pytest.fixture
 def network() -> Iterator[tuple[Live, Callable[[bytes, bytes], None]]]:
     """A source that is subscribed, and what publishes a message for it as a publisher of that name."""
     pytest.importorskip("zenoh", reason="eclipse-zenoh is not installed: pip install 'evplace[live]'")
+    from zenoh import CongestionControl
+
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     camera = session("", "peer", endpoint)
     live = Subscribed(session(endpoint, "peer"), "0/event_camera/events/**", SIZE)
-    publisher = camera.declare_publisher(KEY)
+    publisher = camera.declare_publisher(KEY, congestion_control=CongestionControl.BLOCK)
     until_s = time.monotonic() + HANG_S
     while not publisher.matching_status.matching:
         assert time.monotonic() < until_s
@@ -183,19 +146,10 @@ def network() -> Iterator[tuple[Live, Callable[[bytes, bytes], None]]]:
 
 @needs_zenoh
 @pytest.mark.parametrize("encoding", ["evt3", "mono", "libcaer", "libcaer_cmp"])
-def test_packets_of_each_encoding_come_over_zenoh(
-    encoding: str, drive: Events, network: Any, tmp_path: Any
-) -> None:
+def test_packets_of_each_encoding_come_over_zenoh(encoding: str, drive: Events, network: Any) -> None:
     live, publish = network
-    parts = [drive[at : at + 1000] for at in range(0, len(drive), 1000)]
-    packets = {
-        "evt3": lambda: evt3_packets(drive, tmp_path),
-        "mono": lambda: [mono(part) for part in parts],
-        "libcaer": lambda: [libcaer(part) for part in parts],
-        "libcaer_cmp": lambda: [libcaer_cmp(part) for part in parts],
-    }[encoding]()
-    for packet in packets:
-        publish(message(encoding, packet, int(drive.t_us[0]) * 1000, 0), b"a" * GID)
+    for data in ros_messages(encoding, drive):
+        publish(data, b"a" * GID)
     items = live.blocks()
     found = joined(until(items, lambda items: sum(len(item.t_us) for item in items) >= len(drive)))
     for name in ("t_us", "x", "y", "p"):
@@ -252,54 +206,13 @@ def test_the_attachment_is_that_of_rmw_zenoh() -> None:
 # USB cameras: a stand-in for neuromorphic_drivers; no camera was at hand
 
 
-def packet(t_us: list[int], overflows: list[int] | None = None) -> Any:
-    events = np.zeros(len(t_us), [("t", "<u8"), ("x", "<u2"), ("y", "<u2"), ("on", "?")])
-    events["t"] = t_us
-    return SimpleNamespace(polarity_events=events, polarity_events_overflow_indices=overflows)
-
-
-class StandIn(types.ModuleType):
-    """What we use of neuromorphic_drivers."""
-
-    def __init__(self, cameras: list[str] | None, said: list[Any]) -> None:
-        super().__init__("neuromorphic_drivers")
-        self.cameras, self.said = cameras, said
-        self.closed = False
-
-    def list_devices(self) -> list[Any]:
-        if self.cameras is None:
-            raise RuntimeError("Other error")
-        return [SimpleNamespace(serial=serial) for serial in self.cameras]
-
-    def open(self, serial: str | None, iterator_timeout: float) -> StandIn:
-        assert iterator_timeout > 0
-        if serial == "busy":
-            raise RuntimeError("Access denied")
-        return self
-
-    def properties(self) -> Any:
-        return SimpleNamespace(width=80, height=60)
-
-    def __enter__(self) -> StandIn:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.closed = True
-
-    def __iter__(self) -> Iterator[Any]:
-        for dropped, said in self.said:
-            if isinstance(said, Exception):
-                raise said
-            yield SimpleNamespace(ring=SimpleNamespace(dropped_packets=dropped)), said
-
-
-Plug = Callable[..., StandIn]
+Plug = Callable[..., Camera]
 
 
 @pytest.fixture
 def plug(monkeypatch: pytest.MonkeyPatch) -> Plug:
-    def plugged(cameras: list[str] | None, said: list[Any] | None = None) -> StandIn:
-        made = StandIn(cameras, said or [])
+    def plugged(cameras: list[str] | None, said: list[Any] | None = None) -> Camera:
+        made = Camera(cameras, said or [])
         monkeypatch.setitem(sys.modules, "neuromorphic_drivers", made)
         return made
 

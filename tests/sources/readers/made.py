@@ -163,6 +163,26 @@ def evt3_words(events: Events) -> np.ndarray:
     return words.reshape(-1)
 
 
+def mono_words(events: Events) -> np.ndarray:
+    """As the encoding mono of event_camera_msgs: 64 bits an event, times in ns."""
+    t_ns = events.t_us.astype("<u8") * np.uint64(1000)
+    x, y, p = (field.astype("<u8") for field in (events.x, events.y, events.p))
+    return p << np.uint64(63) | y << np.uint64(48) | x << np.uint64(32) | t_ns
+
+
+def libcaer_words(events: Events) -> np.ndarray:
+    """As the encoding libcaer: two words an event, whose times wrap."""
+    pixel = events.x.astype("<u4") << 17 | events.y.astype("<u4") << 2 | events.p.astype("<u4") << 1 | 1
+    return np.stack([pixel, (events.t_us & 0x7FFFFFFF).astype("<u4")], 1)
+
+
+def encoded(encoding: str, base_ns: int, payload: bytes) -> bytes:
+    """A serialised event_camera_msgs/EventPacket of ROS 1, stamped 7 s."""
+    head = struct.pack("<IIII3sIIQQ", 0, 7, 0, 3, b"cam", 180, 240, 0, base_ns)
+    name = encoding.encode()
+    return head + struct.pack("<I", len(name)) + name + b"\0" + struct.pack("<I", len(payload)) + payload
+
+
 def packet_messages(events: Events, aligned: bool, each: int = 200) -> list[bytes]:
     """The events as serialised event_camera_msgs/EventPacket."""
     messages = []

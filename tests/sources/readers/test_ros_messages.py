@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import struct
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made import ros1_bag, ros2_bag, some_events
+from made import encoded, libcaer_words, mono_words, ros1_bag, ros2_bag, some_events
 
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.core.events import Events
@@ -102,19 +102,10 @@ def test_the_bags_of_the_second_library(tmp_path: Path) -> None:
     assert sum(map(len, open_recording(tmp_path / "packed").packets())) == 100
 
 
-def packet(encoding: str, base_ns: int, payload: bytes) -> bytes:
-    """A serialised event_camera_msgs/EventPacket of ROS 1, stamped 7 s."""
-    head = struct.pack("<IIII3sIIQQ", 0, 7, 0, 3, b"cam", 180, 240, 0, base_ns)
-    name = encoding.encode()
-    return head + struct.pack("<I", len(name)) + name + b"\0" + struct.pack("<I", len(payload)) + payload
-
-
 def test_the_encoding_mono(tmp_path: Path) -> None:
     events = some_events(500, 900_000)
-    dt_ns = events.t_us.astype("<u8") * np.uint64(1000)
-    x, y, p = (field.astype("<u8") for field in (events.x, events.y, events.p))
-    words = p << np.uint64(63) | y << np.uint64(48) | x << np.uint64(32) | dt_ns
-    messages = [packet("mono", 10**9, words[:250].tobytes()), packet("mono", 10**9, words[250:].tobytes())]
+    words = mono_words(events)
+    messages = [encoded("mono", 10**9, words[:250].tobytes()), encoded("mono", 10**9, words[250:].tobytes())]
     back = read(ros1_bag(tmp_path, "event_camera_msgs/EventPacket", messages))
     assert np.array_equal(back.t_us - 7_000_000, events.t_us - events.t_us[0])
     assert np.array_equal(back.x, events.x)
@@ -125,10 +116,9 @@ def test_the_encoding_mono(tmp_path: Path) -> None:
 def test_the_encoding_libcaer_with_a_wrap_inside_a_packet(tmp_path: Path) -> None:
     events = some_events(500, 900_000)
     true_us = events.t_us + (1 << 31) - 400_000
-    pixel = events.x.astype("<u4") << 17 | events.y.astype("<u4") << 2 | events.p.astype("<u4") << 1 | 1
-    words = np.stack([pixel, (true_us & 0x7FFFFFFF).astype("<u4")], 1).tobytes()
+    words = libcaer_words(dataclasses.replace(events, t_us=true_us)).tobytes()
     back = read(
-        ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [packet("libcaer", 5_000_000_000, words)])
+        ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [encoded("libcaer", 5_000_000_000, words)])
     )
     assert np.array_equal(back.t_us, true_us + 5_000_000)
     assert np.array_equal(back.x, events.x)
@@ -176,7 +166,7 @@ def test_the_encoding_libcaer_cmp_in_packets_of_their_own_time(tmp_path: Path) -
         for t_us, x, y, p in zip(part.t_us - base_us, part.x, part.y, part.p, strict=True):
             words += [t_us >> 12, 0x1000 | t_us & 0xFFF, 0x2000 | x, 0x3000 | p << 11 | y]
         messages.append(
-            packet("libcaer_cmp", 5_000_000_000 + base_us * 1000, np.array(words, "<u2").tobytes())
+            encoded("libcaer_cmp", 5_000_000_000 + base_us * 1000, np.array(words, "<u2").tobytes())
         )
     back = read(ros1_bag(tmp_path, "event_camera_msgs/EventPacket", messages))
     assert np.array_equal(back.t_us, events.t_us + 5_000_000)
@@ -186,7 +176,7 @@ def test_the_encoding_libcaer_cmp_in_packets_of_their_own_time(tmp_path: Path) -
 
 def test_a_word_of_libcaer_cmp_that_is_not_known(tmp_path: Path) -> None:
     good, bad = np.array([0x2001, 0x3001], "<u2").tobytes(), np.array([0x2001, 0x7000], "<u2").tobytes()
-    messages = [packet("libcaer_cmp", 0, data) for data in (good, bad)]
+    messages = [encoded("libcaer_cmp", 0, data) for data in (good, bad)]
     recording = open_recording(ros1_bag(tmp_path, "event_camera_msgs/EventPacket", messages))
     with pytest.raises(DamagedRecordingError, match="word 1 is of the unknown kind 7"):
         list(recording.packets())
@@ -194,6 +184,6 @@ def test_a_word_of_libcaer_cmp_that_is_not_known(tmp_path: Path) -> None:
 
 
 def test_an_unknown_encoding_is_an_error_that_names_the_known(tmp_path: Path) -> None:
-    path = ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [packet("evt9", 0, b"\0" * 8)])
+    path = ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [encoded("evt9", 0, b"\0" * 8)])
     with pytest.raises(UnsupportedError, match=r"evt9.*known are evt3, mono, libcaer, libcaer_cmp"):
         open_recording(path)

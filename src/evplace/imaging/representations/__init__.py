@@ -16,6 +16,15 @@ Channels = NDArray[Any]
 """(C, H, W) int8 holding 0 and -1 (set), or float32 in [0, 1]."""
 
 
+def grid_of(representation: Representation) -> NDArray[Any] | None:
+    """What readers may mark themselves, where a representation shows no more than where events fell.
+
+    That is its `grid` (H, W), if it has one: int8, where an event sets -1, or int32, where it adds 1.
+    """
+    grid: NDArray[Any] | None = getattr(representation, "grid", None)
+    return grid
+
+
 class Representation(Protocol):
     """Remembers the events of the open window."""
 

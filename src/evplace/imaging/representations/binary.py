@@ -17,17 +17,18 @@ class Binary:
     used: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, size: Size) -> None:
-        self._grid = np.zeros((1, size[1], size[0]), np.int8)
+        self.grid = np.zeros((size[1], size[0]), np.int8)
+        """(H, W), which readers may mark by themselves."""
 
     def add(self, events: Events) -> None:
         """See Representation."""
-        if not mark(self._grid[0], events.x, events.y):
+        if not mark(self.grid, events.x, events.y):
             raise outside(events)
 
     def channels(self, t_us: int) -> Channels:
         """See Representation."""
-        return self._grid
+        return self.grid[None]
 
     def clear(self) -> None:
         """See Representation."""
-        self._grid.fill(0)
+        self.grid.fill(0)

@@ -18,22 +18,23 @@ class Count:
     used: ClassVar[tuple[str, ...]] = ("saturation",)
 
     def __init__(self, size: Size, saturation: int) -> None:
-        self._grid = np.zeros((size[1], size[0]), np.int32)
+        self.grid = np.zeros((size[1], size[0]), np.int32)
+        """(H, W), which readers may mark by themselves."""
         self._saturation = saturation
 
     def add(self, events: Events) -> None:
         """See Representation."""
-        if not _count(self._grid, events.x, events.y):
+        if not _count(self.grid, events.x, events.y):
             raise outside(events)
 
     def channels(self, t_us: int) -> Channels:
         """See Representation."""
-        share = np.minimum(self._grid, self._saturation) / np.float32(self._saturation)
+        share = np.minimum(self.grid, self._saturation) / np.float32(self._saturation)
         return share.astype(np.float32)[None]
 
     def clear(self) -> None:
         """See Representation."""
-        self._grid.fill(0)
+        self.grid.fill(0)
 
 
 @njit(cache=True)

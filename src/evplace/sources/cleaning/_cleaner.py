@@ -44,6 +44,15 @@ class Cleaner:
             events = self._told("refractory", events, self._refractory.push(events))
         return events
 
+    @property
+    def masks_alone(self) -> bool:
+        """Whether no more is left out than the events of masked pixels."""
+        return self._flicker is None and self._refractory is None
+
+    def count(self, reason: str, events: int) -> None:
+        """So many more events were left out for that reason."""
+        self.dropped[reason] = self.dropped.get(reason, 0) + events
+
     def _told(self, reason: str, before: Events, after: Events) -> Events:
-        self.dropped[reason] = self.dropped.get(reason, 0) + len(before) - len(after)
+        self.count(reason, len(before) - len(after))
         return after

@@ -17,7 +17,9 @@ PACKED = np.dtype([("t", "<u8"), ("x", "<u2"), ("y", "<u2"), ("p", "u1")])
 """An event of 13 bytes, as faery's arrays hold it and its UDP packets send it."""
 HEADER = 1 << 16
 """Bytes within which a text header ends."""
-NUMBERS = re.compile(rb"[ \t]*\d+[ \t,;]+\d+[ \t,;]+\d+[ \t,;]+-?\d+[ \t]*\r?")
+NUMBERS = re.compile(rb"[ \t]*\d{1,18}[ \t,;]+\d{1,9}[ \t,;]+\d{1,9}[ \t,;]+-?\d[ \t]*\r?")
+LINE = 1 << 10
+"""Bytes of the longest line that may be an event."""
 FORMATS = ("evt3", "evt2", "packed", "text")
 
 Decode = Callable[[bytes], Block]
@@ -46,6 +48,8 @@ class ByteStream:
         if whole:
             ready, self._held = self._held[:whole], self._held[whole:]
             yield self._decode(ready)
+        if not self._word:  # what is longer is no event: its end is waited for, but not held
+            self._held = self._held[:LINE]
 
     def _begin(self) -> bool:
         """Whether the format is known by now; the header is taken off."""
@@ -93,7 +97,7 @@ class ByteStream:
         good = [line for line in lines if NUMBERS.fullmatch(line)]
         self.lost += len(lines) - len(good)
         columns = np.array([re.split(rb"[ \t,;]+", line.strip()) for line in good], "S20")
-        table = columns.reshape(-1, 4).astype(np.float64).astype(np.int64)
+        table = columns.reshape(-1, 4).astype(np.int64)
         return as_block(table[:, 0], table[:, 1], table[:, 2], table[:, 3] > 0)
 
 

@@ -43,11 +43,15 @@ class Piped:
     waits = True
 
     def __init__(self, number: int, format: str | None, size: Size | None, pace: float) -> None:
-        self.size = size
         self.pace = pace
         self.notes: list[str] = []
-        self._number, self._bytes = number, ByteStream(format)
+        self._number, self._bytes, self._given = number, ByteStream(format), size
         self._closed = threading.Event()
+
+    @property
+    def size(self) -> Size | None:
+        """The sensor's, as the stream says it once it has begun."""
+        return self._bytes.size or self._given
 
     @property
     def lost(self) -> int:
@@ -68,7 +72,6 @@ class Piped:
             if not data:
                 return
             yield from self._bytes.push(data)
-            self.size = self._bytes.size or self.size
 
 
 def check_format(format: str | None) -> None:

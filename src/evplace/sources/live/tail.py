@@ -45,12 +45,21 @@ class Growing:
     waits = True
 
     def __init__(self, path: Path, format: str | None, size: Size | None, pace: float) -> None:
-        self.size = size
         self.pace = pace
-        self.lost = 0
         self.notes = [] if path.exists() else [f"{path} is not there yet: it is waited for"]
-        self._path, self._format = path, format
+        self._path, self._format, self._given = path, format, size
+        self._bytes, self._lost_before = ByteStream(format), 0
         self._closed = threading.Event()
+
+    @property
+    def size(self) -> Size | None:
+        """The sensor's, as the file says it."""
+        return self._bytes.size or self._given
+
+    @property
+    def lost(self) -> int:
+        """Lines that were no event, of all files."""
+        return self._lost_before + self._bytes.lost
 
     def close(self) -> None:
         """End the watching."""
@@ -70,13 +79,11 @@ class Growing:
 
     def _grown(self, file: BinaryIO) -> Iterator[Item]:
         """The events of one file, until another takes its place."""
-        decoder = ByteStream(self._format)
-        before = self.lost
+        self._lost_before, self._bytes = self.lost, ByteStream(self._format)
         while not self._closed.is_set():
             data = file.read(PART)
             if data:
-                yield from decoder.push(data)
-                self.size, self.lost = decoder.size or self.size, before + decoder.lost
+                yield from self._bytes.push(data)
             elif self._is_another(file):
                 yield ANEW
                 return

@@ -13,11 +13,14 @@ To add a format, add one file and its test. The file holds:
 - `TABLE = True` where events stand in columns, so that `hints.columns` has a meaning.
 
 The reader only decodes. `Recording` checks coordinates and times, counts what it drops, infers a missing
-size and cuts packets, for all formats alike (the rules stand in `_checks`).
+size and cuts packets, for all formats alike (the rules stand in `_checks`). A reader whose loop hands each
+event to `put` of `_canvas` also gives `Source.onto`: plainly good events are then marked on a canvas as they
+are decoded, and the first that is not, with all after it, comes in a block as ever.
 """
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,9 +32,10 @@ from evplace.sources.readers._foreign import foreign
 from evplace.sources.readers._source import Block, Hints, Source, checked_source
 
 if TYPE_CHECKING:
+    from evplace.sources.readers._canvas import Canvas
     from evplace.sources.readers._recording import Recording
 
-__all__ = ["Block", "Hints", "Recording", "Source", "is_recording", "open_recording"]
+__all__ = ["Block", "Canvas", "Hints", "Recording", "Source", "is_recording", "open_recording"]
 
 HEAD = 1 << 16
 """Bytes from which the format is told."""
@@ -98,12 +102,10 @@ def _fields(columns: str) -> tuple[str, ...]:
 
 
 def __getattr__(name: str) -> Any:
-    """Recording, on first use: the child processes that only decode start in half the time without it."""
-    if name != "Recording":
+    """Recording and Canvas, on first use: child processes that only decode start in half the time without."""
+    if name not in ("Canvas", "Recording"):
         raise AttributeError(f"module 'evplace.sources.readers' has no attribute '{name}'")
-    from evplace.sources.readers._recording import Recording
-
-    return Recording
+    return getattr(importlib.import_module(f"{__name__}._{name.lower()}"), name)
 
 
 def is_recording(path: Path) -> bool:

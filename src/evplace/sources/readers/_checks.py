@@ -36,7 +36,7 @@ def checked(block: Block, size: Size, last_us: int, final: bool) -> tuple[Block,
     before more are seen are handed back, unless the block is `final`. Where nothing is dropped the arrays
     are passed on, not copied.
     """
-    t_us, x, y, p, untimed, _ = block
+    t_us, x, y, p, untimed, *_ = block
     start = _first_doubt(t_us, x, y, size[0], size[1], last_us)
     if start == len(t_us):
         return block, None, [0, 0, 0, untimed]
@@ -60,6 +60,18 @@ def _picked(field: NDArray[Any], keep: NDArray[np.bool_]) -> NDArray[Any]:
 
 
 @njit(cache=True)
+def inside(x: int, y: int, width: int, height: int) -> bool:
+    """Whether an event lies on the sensor."""
+    return x < width and y < height
+
+
+@njit(cache=True)
+def timely(t_us: int, last_us: int) -> bool:
+    """Whether an event comes soon after the last one: then it is good without a look at those that follow."""
+    return t_us >= last_us and t_us - JUMP_US <= last_us
+
+
+@njit(cache=True)
 def _first_doubt(
     t_us: NDArray[np.int64],
     x: NDArray[np.uint16],
@@ -71,10 +83,9 @@ def _first_doubt(
     """Index of the first event that is not plainly good; the length where all are."""
     last = last_us
     for i in range(len(t_us)):
-        t = t_us[i]
-        if x[i] >= width or y[i] >= height or t < last or t - JUMP_US > last:
+        if not (inside(x[i], y[i], width, height) and timely(t_us[i], last)):
             return i
-        last = t
+        last = t_us[i]
     return len(t_us)
 
 

@@ -15,6 +15,7 @@ from evplace.core.errors import (
     UnsupportedError,
 )
 from evplace.core.events import Events, Size
+from evplace.sources.readers._canvas import Canvas
 from evplace.sources.readers._checks import NOTHING_YET, REASONS, checked
 from evplace.sources.readers._source import Block, Source, checked_source, joined
 from evplace.sources.readers._verdict import verdict
@@ -63,8 +64,11 @@ class Recording:
         self.size = self._decided_size(size)
         self._forget()
 
-    def packets(self) -> Iterator[Events]:
+    def packets(self, canvas: Canvas | None = None) -> Iterator[Events]:
         """Events from the start, in packets of at most PACKET; the counts start anew as well.
+
+        Where a `canvas` is given, the reader may mark events on it, which are then in no packet: plainly good
+        ones of the window that the canvas has open, all of them before the events of the next packet.
 
         Times never decrease, within a packet and from one to the next. Raises DamagedRecordingError where
         the recording breaks off, after all that came before it has been delivered; DoubtfulRecordingError
@@ -74,9 +78,11 @@ class Recording:
         held: Block | None = None
         fault: RecordingError | None = None
         try:
-            for block in self._source.blocks():
+            for block in self._blocks(canvas):
                 good, held = self._kept(block if held is None else joined([held, block]), final=False)
                 yield from self._delivered(good)
+                if canvas is not None and held is None and self.t_last_us is not None:
+                    canvas.open(self.t_last_us)
         except (DamagedRecordingError, UnsupportedError) as error:
             fault = error
         except OSError as error:
@@ -85,6 +91,17 @@ class Recording:
             good, _ = self._kept(held, final=True)
             yield from self._delivered(good)
         self._judge(fault)
+
+    def _blocks(self, canvas: Canvas | None) -> Iterator[Block]:
+        """Decoded blocks; what was marked before the events of each is counted."""
+        if canvas is None or self._source.onto is None:
+            yield from self._source.blocks()
+            return
+        canvas.close()
+        for block in self._source.onto(canvas):
+            if block.marked:
+                self.events, self.t_last_us = (self.events or 0) + block.marked, canvas.last_us
+            yield block
 
     def _judge(self, fault: RecordingError | None) -> None:
         """Raise what ended the reading, else what speaks against it."""

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.compiled import njit
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
+from evplace.sources.readers._canvas import Canvas, Sink, compiled, put, sink_of
 from evplace.sources.readers._ros2_files import ZSTD
 from evplace.sources.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Bytes, Encoding
 from evplace.sources.readers._source import Block, Hints, Source, gathered, joined, ordered, printable
@@ -145,9 +145,11 @@ def _opened(bag: Bag, first: Message, streams: list[str]) -> Source:
     except FAULTS as error:
         raise RecordingError(f"{bag.path}: the first event message is damaged: {error}") from error
     size = (width, height) if 0 < width <= 1 << 16 and 0 < height <= 1 << 16 else None
-    return Source(
-        size, lambda: gathered(_decoded(bag, first.topic, decode(bag.aligned))), probe.notes, streams=streams
-    )
+
+    def blocks(canvas: Canvas | None = None) -> Iterator[Block]:
+        return gathered(_decoded(bag, first.topic, decode(bag.aligned, canvas)))
+
+    return Source(size, blocks, probe.notes, streams=streams, onto=blocks)
 
 
 def _decoded(bag: Bag, topic: str, decode: Callable[[Bytes], Block]) -> Iterator[Block]:
@@ -167,8 +169,8 @@ def _plain(data: Bytes, aligned: bool) -> Bytes:
 class Packets:
     """event_camera_msgs/EventPacket: what the camera sent, in the encoding that it used."""
 
-    def __init__(self, aligned: bool) -> None:
-        self._aligned = aligned
+    def __init__(self, aligned: bool, canvas: Canvas | None = None) -> None:
+        self._aligned, self._canvas = aligned, canvas
         self._encodings: dict[str, Encoding] = {}
         self._shift_us: int | None = None
         self.notes: list[str] = []
@@ -182,10 +184,11 @@ class Packets:
         name = bytes(fields.raw()).rstrip(b"\0").decode("ascii", "replace")
         fields.take("B")
         self.notes = [] if name in SINCE_EPOCH else [MOVED]
-        block = self._encoding(name)(fields.raw(), base_ns)
+        block = self._encoding(name)(fields.raw(), base_ns, self._shift_us or 0)
         if self._shift_us is None and len(block.t_us):
             self._shift_us = 0 if name in SINCE_EPOCH else stamp_ns // 1000 - int(block.t_us[0])
-        return block._replace(t_us=block.t_us + (self._shift_us or 0))
+            return block._replace(t_us=block.t_us + self._shift_us)
+        return block
 
     def _encoding(self, name: str) -> Encoding:
         if name not in ENCODINGS:
@@ -194,29 +197,38 @@ class Packets:
                 f"messages of the encoding '{printable(name)}' are not read: known are {known}"
             )
         if name not in self._encodings:
-            self._encodings[name] = ENCODINGS[name]()
+            self._encodings[name] = ENCODINGS[name](self._canvas)
         return self._encodings[name]
 
 
 class _Arrays:
     """dvs_msgs/EventArray: one struct an event, with a time stamp of its own."""
 
-    def __init__(self, aligned: bool) -> None:
-        self._aligned = aligned
+    def __init__(self, aligned: bool, canvas: Canvas | None = None) -> None:
+        self._aligned, self._canvas = aligned, canvas
         self.notes: list[str] = []
 
     def __call__(self, data: Bytes) -> Block:
+        return joined([self._block(events) for events in self._runs(data)])
+
+    def _runs(self, data: Bytes) -> list[NDArray[Any]]:
+        """The events as structs of one layout each; ValueError where the message is too short for them."""
         fields = Fields(data, self._aligned)
         fields.header()
         fields.take("I"), fields.take("I")
         count = fields.take("I")
         start = fields.position
         if not self._aligned:
-            return _block(np.frombuffer(data, PACKED, count, start))
+            return [np.frombuffer(data, PACKED, count, start)]
         if count and start % 4 == 0:  # only the first event can start there: it is two bytes shorter
             first = np.frombuffer(data, PACKED, 1, start)
-            return joined([_block(first), _block(_aligned_events(data, count - 1, start + 14))])
-        return _block(_aligned_events(data, count, start))
+            return [first, _aligned_events(data, count - 1, start + 14)]
+        return [_aligned_events(data, count, start)]
+
+    def _block(self, events: NDArray[Any]) -> Block:
+        sink = sink_of(self._canvas, len(events))
+        _decode(events, sink)
+        return sink.block()
 
 
 def _aligned_events(data: Bytes, count: int, start: int) -> NDArray[Any]:
@@ -226,24 +238,10 @@ def _aligned_events(data: Bytes, count: int, start: int) -> NDArray[Any]:
     return np.ndarray((count,), ALIGNED, data, min(start, len(data)), (STEP,))
 
 
-def _block(events: NDArray[Any]) -> Block:
-    count = len(events)
-    t_us, x, y = np.empty(count, np.int64), np.empty(count, np.uint16), np.empty(count, np.uint16)
-    p = np.empty(count, np.bool_)
-    _split(events, t_us, x, y, p)
-    return Block(t_us, x, y, p)
-
-
-@njit(cache=True)
-def _split(
-    events: NDArray[Any],
-    t_us: NDArray[np.int64],
-    x: NDArray[np.uint16],
-    y: NDArray[np.uint16],
-    p: NDArray[np.bool_],
-) -> None:
-    """Fill the arrays from structs of either layout."""
+@compiled
+def _decode(events: NDArray[Any], sink: Sink) -> None:
+    """Hand on the events of structs of either layout."""
     for i in range(len(events)):
         event = events[i]
-        t_us[i] = np.int64(event["s"]) * 1_000_000 + np.int64(event["ns"]) // 1000
-        x[i], y[i], p[i] = event["x"], event["y"], event["p"] != 0
+        t_us = np.int64(event["s"]) * 1_000_000 + np.int64(event["ns"]) // 1000
+        put(sink, t_us, event["x"], event["y"], event["p"] != 0)

@@ -1,5 +1,7 @@
 """The encodings of event_camera_msgs/EventPacket: one function object each, from a packet's bytes to events.
 
+`evt3` and `mono` mark events on a canvas where there is one; the others store all of them, and close it.
+
 Layouts: the README of event_camera_msgs for `mono`, libcaer's polarity.h for `libcaer`, event_camera_codecs
 for `libcaer_cmp`, Prophesee for `evt3`.
 """
@@ -12,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.compiled import njit
+from evplace.sources.readers._canvas import Canvas, Sink, compiled, put, sink_of
 from evplace.sources.readers._source import Block
 from evplace.sources.readers.evt3 import Decoder
 
@@ -20,31 +23,57 @@ TIME_HIGH, TIME_LOW, ADDR_X, ADDR_Y, VECT_BASE_Y, VECT_8 = range(6)
 
 Bytes = bytes | bytearray | memoryview
 """Views, where a message is a part of something larger: it is not copied before it is decoded."""
-Encoding = Callable[[Bytes, int], Block]
-"""A packet's bytes and its time_base in ns -> events; remembers what the next packet needs."""
+Encoding = Callable[..., Block]
+"""A packet's bytes, its time_base in ns and, where some are to be added to all times, microseconds -> events;
+remembers what the next packet needs."""
 SINCE_EPOCH = ("libcaer", "libcaer_cmp")
 """Encodings whose times count from 1970; the others count from the camera's own start."""
 
 
-def evt3() -> Encoding:
+def evt3(canvas: Canvas | None = None) -> Encoding:
     """Prophesee's words as they came from the camera; the time_base means nothing."""
     decoder = Decoder()
-    return lambda data, _: decoder.decode(_words(data, "<u2"))
 
-
-def mono() -> Encoding:
-    """64 bits an event: 32 of time since time_base (ns), 16 of x, 15 of y, the polarity."""
-
-    def decode(data: Bytes, base_ns: int) -> Block:
-        words = _words(data, "<u8")
-        t_ns = (words & np.uint64(0xFFFFFFFF)).astype(np.int64) + _ns(base_ns)
-        x, y = words >> np.uint64(32) & np.uint64(0xFFFF), words >> np.uint64(48) & np.uint64(0x7FFF)
-        return Block(t_ns // 1000, x.astype(np.uint16), y.astype(np.uint16), words >> np.uint64(63) == 1)
+    def decode(data: Bytes, base_ns: int, shift_us: int = 0) -> Block:
+        decoder.shift_us = shift_us
+        return decoder.decode(_words(data, "<u2"), canvas)
 
     return decode
 
 
-def libcaer() -> Encoding:
+def mono(canvas: Canvas | None = None) -> Encoding:
+    """64 bits an event: 32 of time since time_base (ns), 16 of x, 15 of y, the polarity."""
+
+    def decode(data: Bytes, base_ns: int, shift_us: int = 0) -> Block:
+        words = _words(data, "<u8")
+        sink = sink_of(canvas, len(words))
+        _decode_mono(words, _ns(base_ns), shift_us, sink)
+        return sink.block()
+
+    return decode
+
+
+@compiled
+def _decode_mono(words: NDArray[np.uint64], base_ns: int, shift_us: int, sink: Sink) -> None:
+    for unsigned in words:
+        word = np.int64(unsigned & np.uint64(0x7FFFFFFFFFFFFFFF))
+        t_us = (base_ns + (word & 0xFFFFFFFF)) // 1000 + shift_us
+        put(sink, t_us, word >> 32 & 0xFFFF, word >> 48, unsigned >> np.uint64(63) == 1)
+
+
+def stored(decode: Callable[[Bytes, int], Block], canvas: Canvas | None) -> Encoding:
+    """An encoding whose events are all stored, and what follows waits for their checks."""
+
+    def closing(data: Bytes, base_ns: int, shift_us: int = 0) -> Block:
+        block = decode(data, base_ns)
+        if canvas is not None:
+            canvas.close()
+        return block._replace(t_us=block.t_us + shift_us)
+
+    return closing
+
+
+def libcaer(canvas: Canvas | None = None) -> Encoding:
     """Two 32-bit words an event: polarity, y and x above a flag; then 31 bits of microseconds that wrap."""
 
     def decode(data: Bytes, base_ns: int) -> Block:
@@ -55,10 +84,10 @@ def libcaer() -> Encoding:
         x, y = (pixel >> 17 & 0x7FFF).astype(np.uint16), (pixel >> 2 & 0x7FFF).astype(np.uint16)
         return Block(t_us, x, y, (pixel >> 1 & 1).astype(np.bool_))
 
-    return decode
+    return stored(decode, canvas)
 
 
-def libcaer_cmp() -> Encoding:
+def libcaer_cmp(canvas: Canvas | None = None) -> Encoding:
     """16-bit words that change a state (time since time_base, column, row) and give events."""
 
     def decode(data: Bytes, base_ns: int) -> Block:
@@ -72,7 +101,7 @@ def libcaer_cmp() -> Encoding:
             raise ValueError(f"word {used} is of the unknown kind {kinds[used]}")
         return Block(t_us[:count], x[:count], y[:count], p[:count])
 
-    return decode
+    return stored(decode, canvas)
 
 
 @njit(cache=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, ParamSpec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,11 @@ from numpy.typing import NDArray
 from evplace.core import families
 from evplace.core.errors import PartError, RecordingError
 from evplace.core.events import Size
+
+if TYPE_CHECKING:
+    from evplace.sources.readers._canvas import Canvas
+
+P = ParamSpec("P")
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +46,8 @@ class Block(NamedTuple):
     """Events left out because no time had been given yet when they came."""
     back_us: int = 0
     """How far the furthest of the events that the checks left out as backwards lay back."""
+    marked: int = 0
+    """Events before these that were marked on a canvas in place of being stored."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +67,8 @@ class Source:
     streams: Sequence[str] = ()
     """The names of all streams of events in the file, the one that is read first; empty where a format has
     but one, without a name."""
+    onto: Callable[[Canvas], Iterator[Block]] | None = None
+    """As `blocks`, for a reader that can mark events on a canvas in place of storing them."""
 
 
 def ordered(path: Path, streams: Sequence[str], wanted: str | None) -> list[str]:
@@ -98,18 +107,20 @@ def printable(name: str, most: int = SHOWN) -> str:
     return shown if len(shown) <= most else f"{shown[:most]}..."
 
 
-def gathered(blocks: Iterator[Block], events: int = 1 << 15) -> Iterator[Block]:
-    """Small blocks joined into blocks of at least `events` events; what is held comes out before a fault.
+GATHERED = 1 << 15
+"""Events up to which small blocks are joined: larger ones would not stay in the processor's cache until they
+are checked."""
 
-    Much larger ones would not stay in the processor's cache until they are checked.
-    """
+
+def gathered(blocks: Iterator[Block]) -> Iterator[Block]:
+    """Small blocks joined into blocks of at least GATHERED events; what is held comes out before a fault."""
     held: list[Block] = []
     count = 0
     try:
         for block in blocks:
             held.append(block)
-            count += len(block.t_us)
-            if count >= events:
+            count += len(block.t_us) + block.marked
+            if count >= GATHERED:
                 yield joined(held)
                 held, count = [], 0
     except Exception:
@@ -131,6 +142,7 @@ def joined(blocks: list[Block]) -> Block:
         np.concatenate([block.p for block in blocks]),
         sum(block.untimed for block in blocks),
         max(block.back_us for block in blocks),
+        sum(block.marked for block in blocks),
     )
 
 
@@ -141,13 +153,17 @@ def checked_source(source: Source, family: str, part: object) -> Source:
             f"{families.described(family, part)} must open a Source, it gave {type(source).__name__}"
         )
 
-    def blocks() -> Iterator[Block]:
-        with families.blaming(family, part, OSError):
-            for block in source.blocks():
-                _check_block(block, family, part)
-                yield block
+    def checked(blocks: Callable[P, Iterator[Block]]) -> Callable[P, Iterator[Block]]:
+        def checked_blocks(*arguments: P.args, **named: P.kwargs) -> Iterator[Block]:
+            with families.blaming(family, part, OSError):
+                for block in blocks(*arguments, **named):
+                    _check_block(block, family, part)
+                    yield block
 
-    return replace(source, blocks=blocks)
+        return checked_blocks
+
+    onto = None if source.onto is None else checked(source.onto)
+    return replace(source, blocks=checked(source.blocks), onto=onto)
 
 
 def _check_block(block: object, family: str, part: object) -> None:

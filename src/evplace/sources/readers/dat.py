@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import UnsupportedError
-from evplace.sources.readers._clock import clock, unwrap_32
+from evplace.sources.readers._canvas import Canvas, Sink, compiled, put, sink_of
+from evplace.sources.readers._clock import clock, unwrap
 from evplace.sources.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
 from evplace.sources.readers._source import Block, Hints, Source
 
@@ -47,31 +47,34 @@ def read(path: Path, hints: Hints) -> Source:
     notes = [] if version else ["the DAT header states no version: 2 is taken"]
     zero_us = start_us(fields)
     blocks = partial(_blocks, path, start + 2, version == "1", zero_us)
-    return Source(stated_size(fields), blocks, notes, 1 << 32, zero_us)
+    return Source(stated_size(fields), blocks, notes, 1 << 32, zero_us, onto=blocks)
 
 
-def _blocks(path: Path, start: int, first_version: bool, shift_us: int) -> Iterator[Block]:
-    state = None
+def _blocks(
+    path: Path, start: int, first_version: bool, shift_us: int, canvas: Canvas | None = None
+) -> Iterator[Block]:
+    state, widths = None, (9, 8, 1) if first_version else (14, 14, 4)
     for run in words(path, start, RECORD, EVENTS):
         if state is None:
             state = clock(int(run["t"][0]))
-        t_us = unwrap_32(state, np.ascontiguousarray(run["t"]))
-        yield Block(
-            t_us + shift_us if shift_us else t_us, *(_version_1 if first_version else _version_2)(run["data"])
-        )
+        sink = sink_of(canvas, len(run))
+        _decode(run.view("<u4"), state, shift_us, *widths, sink)
+        yield sink.block()
 
 
-def _version_1(data: NDArray[np.uint32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    return (
-        (data & 0x1FF).astype(np.uint16),
-        (data >> 9 & 0xFF).astype(np.uint16),
-        (data >> 17 & 1).astype(np.bool_),
-    )
-
-
-def _version_2(data: NDArray[np.uint32]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    return (
-        (data & 0x3FFF).astype(np.uint16),
-        (data >> 14 & 0x3FFF).astype(np.uint16),
-        (data >> 28).astype(np.bool_),
-    )
+@compiled
+def _decode(
+    run: NDArray[np.uint32],
+    clock_state: NDArray[np.int64],
+    shift_us: int,
+    column_bits: int,
+    row_bits: int,
+    sign_bits: int,
+    sink: Sink,
+) -> None:
+    """Hand on the events: a word of time, and one of column, row and polarity from the lowest bit on."""
+    for i in range(0, len(run), 2):
+        t_us, data = unwrap(clock_state, np.int64(run[i]), 0xFFFFFFFF), np.int64(run[i + 1])
+        column, above = data & ((1 << column_bits) - 1), data >> column_bits
+        sign = above >> row_bits & ((1 << sign_bits) - 1)
+        put(sink, shift_us + t_us, column, above & ((1 << row_bits) - 1), sign != 0)

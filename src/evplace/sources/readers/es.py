@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.compiled import njit
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
+from evplace.sources.readers._canvas import Canvas, Sink, compiled, put, sink_of
 from evplace.sources.readers._prophesee import head_of
 from evplace.sources.readers._source import Block, Hints, Source
 
 ABOUT = "Event Stream (.es) file"
 MAGIC = b"Event Stream"
 DVS, ATIS = 1, 2
-BYTES = 1 << 21
+BYTES = 1 << 18
 """Bytes decoded at a time."""
 
 
@@ -44,42 +44,38 @@ def read(path: Path, hints: Hints) -> Source:
     width, height = int.from_bytes(head[16:18], "little"), int.from_bytes(head[18:20], "little")
     if width == 0 or height == 0:
         raise RecordingError(f"{path} states a sensor of {width}x{height} pixels: the header is damaged")
-    return Source((width, height), partial(_blocks, path, head[15] == ATIS, height))
+    blocks = partial(_blocks, path, head[15] == ATIS, height)
+    return Source((width, height), blocks, onto=blocks)
 
 
-def _blocks(path: Path, atis: bool, height: int) -> Iterator[Block]:
+def _blocks(path: Path, atis: bool, height: int, canvas: Canvas | None = None) -> Iterator[Block]:
     time_us, rest = 0, b""
     with path.open("rb") as file:
         file.seek(20)
         while data := file.read(BYTES):
             run = np.frombuffer(rest + data, np.uint8)
-            room = len(run) // 5 + 1
-            t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
-            p = np.empty(room, np.bool_)
-            count, used, time_us = _decode(run, atis, height, time_us, t_us, x, y, p)
+            sink = sink_of(canvas, len(run) // 5 + 1)
+            used, time_us = _decode(run, atis, height, time_us, sink)
             rest = run[used:].tobytes()
-            yield Block(t_us[:count], x[:count], y[:count], p[:count])
+            yield sink.block()
     if rest:
         raise DamagedRecordingError(f"{path} is cut off inside its last event")
 
 
-@njit(cache=True)
+@compiled
 def _decode(
     run: NDArray[np.uint8],
     atis: bool,
     height: int,
     start_us: int,
-    t_us: NDArray[np.int64],
-    x: NDArray[np.uint16],
-    y: NDArray[np.uint16],
-    p: NDArray[np.bool_],
-) -> tuple[int, int, int]:
-    """Fill the arrays; return the events, the bytes used up and the time.
+    sink: Sink,
+) -> tuple[int, int]:
+    """Hand the events on; return the bytes used up and the time.
 
     The first byte of an event holds the time since the last one above its flags; the greatest values of it
     only add to the time, except for the reset of a DVS stream (0xFE), which adds nothing.
     """
-    time, count, i = start_us, 0, 0
+    time, i = start_us, 0
     while i < len(run):
         byte = int(run[i])
         if atis and byte & 0xFC == 0xFC:
@@ -94,10 +90,7 @@ def _decode(
             break
         time += byte >> 2 if atis else byte >> 1
         if not (atis and byte & 1):  # ATIS also sends exposure measurements
-            t_us[count] = time
-            x[count] = run[i + 1] | np.uint16(run[i + 2]) << 8
-            y[count] = height - 1 - (run[i + 3] | np.uint16(run[i + 4]) << 8)
-            p[count] = byte >> 1 & 1 if atis else byte & 1
-            count += 1
+            column, below = run[i + 1] | np.int64(run[i + 2]) << 8, run[i + 3] | np.int64(run[i + 4]) << 8
+            put(sink, time, column, height - 1 - below, (byte >> 1 if atis else byte) & 1 != 0)
         i += 5
-    return count, i, time
+    return i, time

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.compiled import njit
+from evplace.sources.readers._canvas import Canvas, Sink, compiled, put, sink_of
 from evplace.sources.readers._clock import clock, unwrap
 from evplace.sources.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
 from evplace.sources.readers._source import Block, Hints, Source
 
 ABOUT = "Prophesee raw file, EVT 2.0"
-WORDS = 1 << 19
+WORDS = 1 << 16
 """Words decoded at a time."""
 
 
@@ -32,50 +32,44 @@ def read(path: Path, hints: Hints) -> Source:
     fields, start = header(head_of(path))
     zero_us = start_us(fields)
     blocks = partial(_blocks, path, start, zero_us)
-    return Source(stated_size(fields), blocks, turn_us=1 << 34, zero_us=zero_us)
+    return Source(stated_size(fields), blocks, turn_us=1 << 34, zero_us=zero_us, onto=blocks)
 
 
-def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:
-    decode = decoder(shift_us)
+def _blocks(path: Path, start: int, shift_us: int, canvas: Canvas | None = None) -> Iterator[Block]:
+    decode = decoder(shift_us, canvas)
     for run in words(path, start, "<u4", WORDS):
         yield decode(run)
 
 
-def decoder(shift_us: int = 0) -> Callable[[NDArray[np.uint32]], Block]:
-    """A run of words -> its events; it remembers the time from one run to the next."""
+def decoder(shift_us: int = 0, canvas: Canvas | None = None) -> Callable[[NDArray[np.uint32]], Block]:
+    """A run of words -> its events, as far as they are not marked on the canvas; it remembers the time."""
     state, clock_state = np.zeros(3, np.int64), clock()
 
     def decode(run: NDArray[np.uint32]) -> Block:
-        room = len(run)
-        t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
-        p = np.empty(room, np.bool_)
+        sink = sink_of(canvas, len(run))
         state[2] = 0
-        count = _decode(run, state, clock_state, shift_us, t_us, x, y, p)
-        return Block(t_us[:count], x[:count], y[:count], p[:count], int(state[2]))
+        _decode(run, state, clock_state, shift_us, sink)
+        return sink.block(int(state[2]))
 
     return decode
 
 
-@njit(cache=True)
+@compiled
 def _decode(
     run: NDArray[np.uint32],
     state: NDArray[np.int64],
     clock_state: NDArray[np.int64],
     shift_us: int,
-    t_us: NDArray[np.int64],
-    x: NDArray[np.uint16],
-    y: NDArray[np.uint16],
-    p: NDArray[np.bool_],
-) -> int:
-    """Fill the arrays; `state` is the time above the 6 low bits, whether it is known, and events without."""
-    high, timed, untimed, count = state[0], state[1] != 0, 0, 0
+    sink: Sink,
+) -> None:
+    """Hand events on; `state` is the time above the 6 low bits, whether it is known, and events without."""
+    high, timed, untimed = state[0], state[1] != 0, 0
     for word in run:
         kind = word >> 28
         if kind <= 1:
             if timed:
-                t_us[count] = shift_us + (high << 6 | np.int64(word >> 22 & 0x3F))
-                x[count], y[count], p[count] = word >> 11 & 0x7FF, word & 0x7FF, kind == 1
-                count += 1
+                time = shift_us + (high << 6 | np.int64(word >> 22 & 0x3F))
+                put(sink, time, word >> 11 & 0x7FF, word & 0x7FF, kind == 1)
             else:
                 untimed += 1
         elif kind == 0x8:
@@ -84,4 +78,3 @@ def _decode(
                 clock_state[0], timed = value, True
             high = unwrap(clock_state, value, 0xFFFFFFF)
     state[0], state[1], state[2] = high, timed, untimed
-    return count

@@ -15,15 +15,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.compiled import njit
 from evplace.core.errors import UnsupportedError
+from evplace.sources.readers._canvas import Canvas, Sink, compiled, put, sink_of
 from evplace.sources.readers._clock import clock, unwrap
 from evplace.sources.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
 from evplace.sources.readers._source import Block, Hints, Source
 
 ABOUT = "Prophesee raw file, EVT 2.1"
-WORDS = 1 << 17
-"""Words decoded at a time; a word gives 32 events at most."""
+WORDS = 1 << 15
+"""Words decoded at a time."""
+MOST = 32
+"""Events that a word gives at most."""
 SAMPLE = 1 << 14
 """Words from which their order is told."""
 TIME_HIGH = 0x8
@@ -46,7 +48,7 @@ def read(path: Path, hints: Hints) -> Source:
     zero_us = start_us(fields)
     order, notes = _order(path, fields, start)
     blocks = partial(_blocks, path, start, order == "legacy", zero_us)
-    return Source(stated_size(fields), blocks, notes, turn_us=1 << 34, zero_us=zero_us)
+    return Source(stated_size(fields), blocks, notes, turn_us=1 << 34, zero_us=zero_us, onto=blocks)
 
 
 def _order(path: Path, fields: dict[str, str], start: int) -> tuple[str, list[str]]:
@@ -76,44 +78,28 @@ def _swapped(run: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return run >> np.uint64(32) | run << np.uint64(32)
 
 
-def _blocks(path: Path, start: int, legacy: bool, shift_us: int) -> Iterator[Block]:
+def _blocks(
+    path: Path, start: int, legacy: bool, shift_us: int, canvas: Canvas | None = None
+) -> Iterator[Block]:
     state, clock_state = np.zeros(3, np.int64), clock()
     for stored in words(path, start, "<u8", WORDS):
         run = _swapped(stored) if legacy else stored
-        room = _events_in(run)
-        t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
-        p = np.empty(room, np.bool_)
+        sink = sink_of(canvas, MOST * len(run))
         state[2] = 0
-        count = _decode(run, state, clock_state, shift_us, t_us, x, y, p)
-        yield Block(t_us[:count], x[:count], y[:count], p[:count], int(state[2]))
+        _decode(run, state, clock_state, shift_us, sink)
+        yield sink.block(int(state[2]))
 
 
-@njit(cache=True)
-def _events_in(run: NDArray[np.uint64]) -> int:
-    """Events that the words give, whether or not their time is known."""
-    count = 0
-    for word in run:
-        if word >> np.uint64(60) <= 1:
-            bits = np.int64(word & np.uint64(0xFFFFFFFF))
-            while bits:
-                bits &= bits - 1
-                count += 1
-    return count
-
-
-@njit(cache=True)
+@compiled
 def _decode(
     run: NDArray[np.uint64],
     state: NDArray[np.int64],
     clock_state: NDArray[np.int64],
     shift_us: int,
-    t_us: NDArray[np.int64],
-    x: NDArray[np.uint16],
-    y: NDArray[np.uint16],
-    p: NDArray[np.bool_],
-) -> int:
-    """Fill the arrays; `state` is the time above the 6 low bits, whether it is known, and events without."""
-    high, timed, untimed, count = state[0], state[1] != 0, 0, 0
+    sink: Sink,
+) -> None:
+    """Hand events on; `state` is the time above the 6 low bits, whether it is known, and events without."""
+    high, timed, untimed = state[0], state[1] != 0, 0
     for unsigned in run:
         kind = unsigned >> np.uint64(60)
         word = np.int64(unsigned & np.uint64(0x0FFFFFFFFFFFFFFF))
@@ -124,9 +110,8 @@ def _decode(
                 lowest = bits & -bits
                 bits ^= lowest
                 if timed:
-                    t_us[count], x[count] = time, (word >> 43 & 0x7FF) + POSITION[lowest % 37]
-                    y[count], p[count] = word >> 32 & 0x7FF, kind == 1
-                    count += 1
+                    column = (word >> 43 & 0x7FF) + POSITION[lowest % 37]
+                    put(sink, time, column, word >> 32 & 0x7FF, kind == 1)
                 else:
                     untimed += 1
         elif kind == TIME_HIGH:
@@ -135,4 +120,3 @@ def _decode(
                 clock_state[0], timed = value, True
             high = unwrap(clock_state, value, 0xFFFFFFF)
     state[0], state[1], state[2] = high, timed, untimed
-    return count

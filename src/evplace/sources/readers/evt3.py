@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.compiled import njit
+from evplace.sources.readers._canvas import Canvas, Sink, compiled, put, sink_of
 from evplace.sources.readers._clock import clock, unwrap
 from evplace.sources.readers._prophesee import evt_version, head_of, header, start_us, stated_size, words
-from evplace.sources.readers._source import Block, Hints, Source, joined
+from evplace.sources.readers._source import Block, Hints, Source
 
 ABOUT = "Prophesee raw file, EVT 3.0"
-WORDS = 1 << 18
+WORDS = 1 << 16
 """Words decoded at a time."""
 TIME_HIGH = 0x8
 """The kind of word that sends the upper half of the time; before the first, no event has one."""
@@ -36,78 +36,57 @@ def read(path: Path, hints: Hints) -> Source:
     fields, start = header(head_of(path))
     zero_us = start_us(fields)
     blocks = partial(_blocks, path, start, zero_us)
-    return Source(stated_size(fields), blocks, turn_us=1 << 24, zero_us=zero_us)
+    return Source(stated_size(fields), blocks, turn_us=1 << 24, zero_us=zero_us, onto=blocks)
 
 
-def _blocks(path: Path, start: int, shift_us: int) -> Iterator[Block]:
+def _blocks(path: Path, start: int, shift_us: int, canvas: Canvas | None = None) -> Iterator[Block]:
     decoder = Decoder(shift_us)
     for part in words(path, start, "<u2", WORDS):
-        yield from decoder.parts(part)
+        yield decoder.decode(part, canvas)
 
 
 class Decoder:
     """Remembers row, column and time from one run of words to the next."""
 
     def __init__(self, shift_us: int = 0) -> None:
-        self._shift_us = shift_us
+        self.shift_us = shift_us
+        """Added to all times."""
         self._state = np.zeros(4, np.int64)  # time (us), row, base column, polarity
         self._clock = clock()
         self._timed = False
 
-    def decode(self, run: NDArray[np.uint16]) -> Block:
-        """The events of `run`, in the order of the words."""
-        return joined(list(self.parts(run)))
-
-    def parts(self, run: NDArray[np.uint16]) -> Iterator[Block]:
-        """The events of `run` in one block, or in several where a word gives more than one event."""
+    def decode(self, run: NDArray[np.uint16], canvas: Canvas | None = None) -> Block:
+        """The events of `run` in the order of the words, as far as they are not marked on the canvas."""
         untimed = 0
         if not self._timed:
             high = np.flatnonzero(run >> 12 == TIME_HIGH)
             first = int(high[0]) if len(high) else len(run)
-            untimed = sum(len(block.t_us) for block in self._decoded(run[:first]))
+            untimed = len(self._decoded(run[:first], None).t_us)
             run = run[first:]
             if len(high):
                 self._timed, self._clock[0] = True, int(run[0]) & 0xFFF
-        for block in self._decoded(run):
-            yield block._replace(untimed=untimed)
-            untimed = 0
+        return self._decoded(run, canvas)._replace(untimed=untimed)
 
-    def _decoded(self, run: NDArray[np.uint16]) -> Iterator[Block]:
-        """At least one block."""
-        used = 0
-        while True:
-            room = len(run) - used + MOST
-            t_us, x, y = np.empty(room, np.int64), np.empty(room, np.uint16), np.empty(room, np.uint16)
-            p = np.empty(room, np.bool_)
-            count, more = _decode(run[used:], self._state, self._clock, self._shift_us, t_us, x, y, p)
-            yield Block(t_us[:count], x[:count], y[:count], p[:count])
-            used += more
-            if used == len(run):
-                return
+    def _decoded(self, run: NDArray[np.uint16], canvas: Canvas | None) -> Block:
+        sink = sink_of(canvas, MOST * len(run))
+        _decode(run, self._state, self._clock, self.shift_us, sink)
+        return sink.block()
 
 
-@njit(cache=True)
+@compiled
 def _decode(
     run: NDArray[np.uint16],
     state: NDArray[np.int64],
     clock_state: NDArray[np.int64],
     shift_us: int,
-    t_us: NDArray[np.int64],
-    x: NDArray[np.uint16],
-    y: NDArray[np.uint16],
-    p: NDArray[np.bool_],
-) -> tuple[int, int]:
-    """Fill the arrays; return the events and the words used, all unless the arrays are full before."""
+    sink: Sink,
+) -> None:
+    """Hand on the events of all words."""
     time, row, base, polarity = state[0], state[1], state[2], state[3] != 0
-    count, i, last = 0, 0, len(t_us) - MOST
-    while i < len(run) and count <= last:
-        word = run[i]
-        i += 1
+    for word in run:
         kind, value = word >> 12, np.int64(word & 0xFFF)
         if kind == 0x2:  # one event
-            t_us[count], x[count], y[count] = shift_us + time, value & 0x7FF, row
-            p[count] = value & 0x800 != 0
-            count += 1
+            put(sink, shift_us + time, value & 0x7FF, row, value & 0x800 != 0)
         elif kind == 0x6:
             time = (time & ~np.int64(0xFFF)) | value
         elif kind == 0x0:
@@ -116,8 +95,7 @@ def _decode(
             width = 12 if kind == 0x4 else 8
             for bit in range(width):
                 if value >> bit & 1:
-                    t_us[count], x[count], y[count], p[count] = shift_us + time, base + bit, row, polarity
-                    count += 1
+                    put(sink, shift_us + time, base + bit, row, polarity)
             base += width
         elif kind == 0x3:
             base, polarity = value & 0x7FF, value & 0x800 != 0
@@ -126,4 +104,3 @@ def _decode(
             if high != time >> 12:  # a repeated one leaves the low bits alone
                 time = high << 12
     state[0], state[1], state[2], state[3] = time, row, base, polarity
-    return count, i

@@ -46,9 +46,9 @@ def open_track(
     Fixes that cannot be used are left out, counted in `Track.dropped` and shown in `Track.notes`: those
     without a position, and those that cannot be true, as no vehicle goes faster than `max_speed_mps` or
     otherwise than its log's own speed and course say. Where the log's clock was set on the way, or its
-    positions leapt for good, `keep` ("before", "after") says which side is right. A slow drift of the
-    positions shows only against a speed and course of the log's own: else it is not checked. A log that
-    breaks off gives its good part, and `Track.fault` says so.
+    positions leapt for good, `keep` ("before", "after", of a clock also "both") says which side is right. A
+    slow drift of the positions shows only against a speed and course of the log's own: else it is not
+    checked. A log that breaks off gives its good part, and `Track.fault` says so.
 
     Raises TrackError where the file cannot be read or holds no usable fix, SettingsError for a setting.
     """

@@ -13,8 +13,8 @@ from evplace.sources._times import DAY_US
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
-Keep = Literal["before", "after"]
-"""Which side is right where a log's clock was set, or its positions leapt for good."""
+Keep = Literal["before", "after", "both"]
+"""Which side is right where a log's clock was set, or its positions leapt for good; of a clock also both."""
 
 _SHOWN = 90
 """Characters of a line that are shown as an example."""
@@ -99,6 +99,8 @@ class Fixes:
     """Whether times count from 1970, not from the midnight before the first fix."""
     unit: str | None = None
     """The unit that the times were taken in, where the file does not say."""
+    held_against: str = ""
+    """What of the log's own its positions were held against as they go on, so that a drift shows."""
     losses: Losses = field(default_factory=Losses)
     """What the reader left out."""
     notes: list[str] = field(default_factory=list)

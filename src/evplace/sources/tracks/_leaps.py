@@ -76,7 +76,7 @@ class Leaps:
     def other_side(self, keep: Keep | None) -> Bools:
         """(N,) which fixes lie on the side of a leap for good that is not to be kept."""
         at, every = self._for_good(), np.arange(len(self.fixes))
-        if keep is None or not len(at):
+        if keep not in ("before", "after") or not len(at):
             return np.zeros(len(every), np.bool_)
         return np.asarray(every >= at[0] if keep == "before" else every < at[-1], np.bool_)
 

@@ -8,6 +8,7 @@ drift of the positions where it has no speed and course of its own, cannot be fo
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,29 +70,38 @@ def possible(fixes: Fixes, max_speed_mps: float, keep: Keep | None = None, zone:
     other = Leaps.of(fixes).other_side(keep)
     fixes, speed = fixes.without(other, "of the other side of a leap"), speed[~other]
     own = _own_velocity(fixes, speed, zone)
-    kept = _by_leaps(fixes, speed, max_speed_mps) if own is None else _by_way(fixes, own, max_speed_mps)
+    if own is None:
+        kept, drift_shows = _by_leaps(fixes, speed, max_speed_mps), False
+    else:
+        kept, drift_shows = _by_way(fixes, own, max_speed_mps)
     few = 2 * kept.sum() < len(np.unique(fixes.t_us))
     if few or _usual_mps(fixes[kept]) > max_speed_mps:
         raise TrackError(_too_fast(fixes, max_speed_mps))
-    by = "the log's own speed" if np.isfinite(speed).any() else "the movement around"
-    return _split(fixes, kept, max_speed_mps, f"against {by}")
+    has_speed = bool(np.isfinite(speed).any())
+    by = "the log's own speed" if has_speed else "the movement around"
+    good = _split(fixes, kept, max_speed_mps, f"against {by}")
+    against = "speed and course" if drift_shows else "speed" if has_speed else ""
+    return replace(good, held_against=against)
 
 
-def _by_way(fixes: Fixes, velocity: Floats, max_speed_mps: float) -> Bools:
-    """(N,) the fixes that go together where the log's own speed and course say how it moved."""
+def _by_way(fixes: Fixes, velocity: Floats, max_speed_mps: float) -> tuple[Bools, bool]:
+    """(N,) the fixes that go together where the log's own speed and course say how it moved.
+
+    And whether a slow drift would show.
+    """
     way = Way.of(fixes, velocity, OWN_SLACK_M)
     loose = _chain(fixes, way, max_speed_mps)
     if np.median(np.hypot(*velocity[np.isfinite(velocity[:, 0])].T)) < MOVING_MPS:
-        return loose  # on foot, where noise is more than the movement
+        return loose, False  # on foot, where noise is more than the movement
     kept = _chain(fixes, way, max_speed_mps, DRIFT_M)
     if 2 * kept.sum() >= loose.sum():
         Leaps.of(fixes).ask(~kept)
-        return kept
+        return kept, True
     fixes.notes.append(
         "the positions keep drifting away from where the log's own speed and course lead: one of the two is "
         "wrong, and a log cannot tell which, so that the drift is not checked"
     )
-    return loose
+    return loose, False
 
 
 def _by_leaps(fixes: Fixes, speed: Floats, max_speed_mps: float) -> Bools:

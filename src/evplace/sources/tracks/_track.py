@@ -58,6 +58,9 @@ class Track:
     """Whether times count from 1970; else from the midnight before the first fix."""
     unit: str | None = None
     """The unit that the log's times were taken in, where the log does not say."""
+    held_against: str = ""
+    """What of the log's own its positions were held against: "speed and course", in which a slow drift shows;
+    "speed", in which one to the side does not; or nothing, which is so from `local`, too."""
 
     def __len__(self) -> int:
         return len(self.t_us)
@@ -101,7 +104,7 @@ class Track:
         notes = (*good.notes, *good.losses.sentences())
         return cls(
             good.t_us + np.int64(offset_us), good.latitude, good.longitude, easting, northing, heading, zone,
-            northern, good.losses.counts, notes, good.fault, good.dated, good.unit,
+            northern, good.losses.counts, notes, good.fault, good.dated, good.unit, good.held_against,
         )  # fmt: skip
 
     @classmethod
