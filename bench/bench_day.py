@@ -1,7 +1,7 @@
 """Memory of a live drive of a day, hour by hour, for each matcher: python bench/bench_day.py [--rate 30]
 
-Against 10,000 references, by a simulated clock. A day at 30 Hz is 2.6 million steps, minutes to an hour of work;
-at a lower rate an hour has fewer of them. Memory is all that the process holds (Linux). Without matchers named,
+Against 10,000 references, by a simulated clock. A day at 30 Hz is 2.6 million steps, up to an hour of CPU;
+at a lower rate an hour has fewer. Memory is all that the process holds (Linux). Without matchers named,
 each runs in a process of its own.
 """
 

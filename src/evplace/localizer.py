@@ -20,6 +20,7 @@ from evplace.core import families
 from evplace.core.errors import PartError, PlaceMapError, RecordingError
 from evplace.core.events import Events, Size
 from evplace.core.settings import make, to_dict
+from evplace.core.tables import empty_rows, rows_of
 from evplace.imaging.activity import Activity
 from evplace.imaging.averaging import Averager
 from evplace.imaging.recipe import shown
@@ -223,7 +224,7 @@ class Localizer:
         filled = np.flatnonzero(query.counts != 0)
         rows, seen = self._seen_of(query, filled, answers, rows)
         live = answers == "live"
-        found, delay = self._live(rows[filled], seen) if live else self._in_hindsight(rows[filled], seen)
+        found, delay = (self._live if live else self._in_hindsight)(rows_of(rows, filled), seen)
         item = np.full(len(query), -1, np.int64)
         score = np.full(len(query), np.nan)
         accepted = np.zeros(len(query), np.bool_)
@@ -237,7 +238,7 @@ class Localizer:
 
         Live, image by image, since the size of a batch may change the last bits of a score.
         """
-        made = np.zeros((len(query), len(self.map.items)), np.float32) if rows is None else rows
+        made = empty_rows(len(query), len(self.map.items)) if rows is None else rows
         seen: list[Seen] = []
         block = 1 if answers == "live" else BLOCK
         for start in range(0, len(filled), block):

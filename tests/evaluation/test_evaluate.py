@@ -7,10 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from evplace.core import tables
 from evplace.core.errors import EvaluationError
 from evplace.evaluation._evaluate import evaluate, truth_of
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
+from evplace.matchers import _kept
 from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid, PlaceRuns
 from evplace.sources.tracks import Track
@@ -122,3 +124,20 @@ def test_results_keep_positions_and_time(image_map: PlaceMap, night: Traverse) -
     np.testing.assert_array_equal(result.item_xy, image_map.items.position)
     assert result.took_s is not None
     assert np.nanmedian(result.error_m) < 5
+
+
+@pytest.mark.parametrize("answers", ["live", "hindsight"])
+def test_rows_that_memory_does_not_hold_give_the_same_result(
+    image_map: PlaceMap, night: Traverse, answers: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some images without events are passed over."""
+    counts = night.counts.copy()
+    counts[3:5] = 0
+    drive = dataclasses.replace(night, counts=counts)
+    held = evaluate(Localizer(image_map), drive, answers=answers)
+    monkeypatch.setattr(tables, "MEMORY_BYTES", 0)
+    monkeypatch.setattr(_kept, "MEMORY_BYTES", 0)
+    written = evaluate(Localizer(image_map), drive, answers=answers)
+    assert isinstance(written.scores, np.memmap)
+    assert written.figures == held.figures
+    np.testing.assert_array_equal(written.scores, held.scores)

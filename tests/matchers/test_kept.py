@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
+import io
+
 import numpy as np
 import pytest
 
+from evplace.core.errors import InputError
 from evplace.matchers import Answer, Rows, _kept, _rows, open_matcher
 
 MATCHERS = ["best", "local", "seqslam", "hmm", "dp", "graph", "bayes"]
@@ -80,3 +84,33 @@ def test_the_graph_forgets_nodes_that_nothing_reaches(alpha: float) -> None:
     assert not known[0]
     assert known[-20:].all()
     np.testing.assert_array_equal(path.item[known], complete.item[known])
+
+
+@pytest.mark.parametrize("name", ["hmm", "dp", "bayes"])
+@pytest.mark.parametrize("held", [0, 2000])
+def test_a_path_through_what_lies_in_a_file_is_the_same(
+    name: str, held: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def path() -> str:
+        matching = open_matcher(name)
+        for start in range(0, QUERIES, 7):
+            matching.extend(drive()[start : start + 7])
+        return repr(matching.path())
+
+    wanted = path()
+    monkeypatch.setattr(_kept, "MEMORY_BYTES", held)
+    assert path() == wanted
+
+
+class Full(io.BytesIO):
+    """A file on a full disk."""
+
+    def write(self, _: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_full_disk_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_kept, "MEMORY_BYTES", 0)
+    monkeypatch.setattr(_kept.tempfile, "TemporaryFile", Full)
+    with pytest.raises(InputError, match=r"does not fit into .*No space left"):
+        open_matcher("dp").extend(drive())

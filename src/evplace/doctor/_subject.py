@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.events import Events, Size
 from evplace.doctor._silences import Silences
 from evplace.imaging.windows import WindowSettings

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.events import Events
 from evplace.doctor._outcome import Finding, Outcome, State
 from evplace.doctor._subject import Subject

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from evplace.core.compiled import njit
 
 Taps = dict[int, int]
 """Input -> its weight in an output."""

@@ -12,10 +12,10 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from evplace.core import families
+from evplace.core.compiled import njit
 from evplace.core.errors import SettingsError, TraverseError
 from evplace.core.events import Events, Size
 from evplace.imaging._resampling import Resampler, Resize, axis_map

@@ -10,9 +10,9 @@ benchmark's (`evplace reproduce known`).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.matchers._known_weights import LATE, LIVE
 
 Floats = NDArray[np.float64]

@@ -8,8 +8,9 @@ drive); and a small share may be anywhere.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from evplace.core.compiled import njit
 
 Belief = NDArray[np.float64]
 """(references, speeds)."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import SettingsError
 from evplace.matchers import Answer, Matching, Path, Row, Rows, Sweep
 from evplace.matchers._rows import Answers, RowCheck

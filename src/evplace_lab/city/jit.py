@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar, cast
 
-from numba import njit
+from evplace.core.compiled import njit
 
 Loop = TypeVar("Loop", bound=Callable[..., object])
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from evplace.core.compiled import njit
 from evplace.core.errors import RecordingError
 from evplace.core.events import Events
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import njit
 
+from evplace.core.compiled import njit
 from evplace.core.events import Events, Size
 from evplace.imaging.representations import Channels
 from evplace.imaging.representations._grids import outside

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import SettingsError
 from evplace.core.events import Events, Size
 from evplace.sources.cleaning._pixels import Counts, Mask, check_size, only

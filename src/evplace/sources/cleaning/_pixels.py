@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import RecordingError, SettingsError
 from evplace.core.events import Events, Size
 

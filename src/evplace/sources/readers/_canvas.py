@@ -7,14 +7,14 @@ it and all that follow are stored, for `Recording` to check as ever, which opens
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
-from numba import njit, types
-from numba.extending import overload
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.sources.readers._checks import inside, timely
 from evplace.sources.readers._source import Block
 
@@ -28,7 +28,7 @@ CLOSED = np.iinfo(np.int64).min
 """The first two of these times where a canvas is closed: no event has it."""
 GRID = 5
 """The place of the grid in a sink."""
-UNCOUNTED = {"_nrt": False}
+UNCOUNTED: dict[str, Any] = {"_nrt": False}
 """Loops that decode make no arrays, so that numba need not count references to those in a sink, event by
 event, which would take three quarters of the time."""
 
@@ -113,17 +113,29 @@ def _columns(
 
 def compiled(loop: Loop) -> Loop:
     """Decorator of every loop that decodes into a sink."""
-    return cast(Loop, njit(cache=True, nogil=True, **UNCOUNTED)(loop))
+    return cast(Loop, njit(before=_overloads, cache=True, nogil=True, **UNCOUNTED)(loop))
 
 
 def put(sink: Sink, t_us: Any, x: Any, y: Any, p: Any) -> None:
     """Mark an event, or store it: within compiled loops."""
 
 
-@overload(put, jit_options=UNCOUNTED)
-def _put(sink: Any, t_us: Any, x: Any, y: Any, p: Any) -> Any:
-    """It depends on the sink's type, so that it is decided once a loop, not once an event."""
-    return _store if isinstance(sink[GRID], types.NoneType) else _mark_or_store
+@functools.cache
+def _overloads() -> None:
+    """Say what `put` and `_masked` are in compiled loops.
+
+    It depends on the types of a sink, so that it is decided once a loop, not once an event.
+    """
+    from numba import types
+    from numba.extending import overload
+
+    @overload(put, jit_options=UNCOUNTED)
+    def _put(sink: Any, t_us: Any, x: Any, y: Any, p: Any) -> Any:
+        return _store if isinstance(sink[GRID], types.NoneType) else _mark_or_store
+
+    @overload(_masked, jit_options=UNCOUNTED)
+    def _masked_of(mask: Any, row: Any, column: Any) -> Any:
+        return _never if isinstance(mask, types.NoneType) else _looked_up
 
 
 def _store(sink: Any, t_us: Any, x: Any, y: Any, p: Any) -> None:
@@ -172,11 +184,6 @@ def _close(tally: NDArray[np.int64]) -> None:
 
 def _masked(mask: Any, row: Any, column: Any) -> Any:
     """Whether a pixel is masked."""
-
-
-@overload(_masked, jit_options=UNCOUNTED)
-def _masked_of(mask: Any, row: Any, column: Any) -> Any:
-    return _never if isinstance(mask, types.NoneType) else _looked_up
 
 
 def _never(mask: Any, row: Any, column: Any) -> Any:

@@ -13,9 +13,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.events import Size
 from evplace.sources.readers._source import Block
 

@@ -9,8 +9,9 @@ wrapped. (So a clock must be read more than twice a turn; cameras send theirs hu
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from evplace.core.compiled import njit
 
 NONE = np.int64(-(1 << 62))
 """Stands for a value before a leap where there was none."""

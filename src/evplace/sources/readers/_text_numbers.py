@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from evplace.core.compiled import njit
 
 NEWLINE, RETURN, MINUS, PLUS, DOT = ord("\n"), ord("\r"), ord("-"), ord("+"), ord(".")
 HASH, PERCENT = ord("#"), ord("%")

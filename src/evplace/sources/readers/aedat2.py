@@ -13,9 +13,9 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import RecordingError
 from evplace.core.events import Size
 from evplace.sources.readers._clock import clock, unwrap

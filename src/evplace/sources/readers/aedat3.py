@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.sources.readers._source import Block, Hints, Source, gathered, numbered
 from evplace.sources.readers._unpack import LIMIT

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import InputError, SettingsError
 from evplace.core.events import Events, Size
 from evplace.sources.simulators.motion import Frame, MotionCheck, image_motion

@@ -6,8 +6,9 @@ import warnings
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from evplace.core.compiled import njit
 
 Frame = NDArray[Any]
 """(H, W) 8-bit grey, or linear light as floats."""

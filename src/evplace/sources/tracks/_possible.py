@@ -12,9 +12,9 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import TrackError
 from evplace.sources._times import DATED_US
 from evplace.sources.tracks._fixes import Bools, Fixes, Floats, Keep
