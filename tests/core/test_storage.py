@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -13,6 +14,8 @@ import pytest
 from evplace.core.errors import InputError, OutputError
 from evplace.core.storage import (
     GrowingArray,
+    check_new_file,
+    check_new_folder,
     locked,
     new_file,
     new_folder,
@@ -181,3 +184,15 @@ def test_an_archive_or_objects_under_the_name_of_an_array(tmp_path: Path) -> Non
             read_array(tmp_path / name, "it")
     np.save(tmp_path / "empty.npy", np.zeros((0, 4)))
     assert read_array(tmp_path / "empty.npy", "it").shape == (0, 4)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_pipe_is_no_output(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for check in (check_new_file, lambda path, overwrite: check_new_folder(path, overwrite, "x")):
+        with pytest.raises(OutputError, match="is a pipe or a device, which no output replaces"):
+            check(pipe, overwrite=True)
+    with pytest.raises(OutputError, match="pipe or a device"), new_file(pipe, overwrite=True):
+        pass
+    assert pipe.is_fifo()

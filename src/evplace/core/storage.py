@@ -248,6 +248,8 @@ def _refuse_device(path: Path, what: str) -> None:
 def _refuse_existing(target: Path, overwrite: bool) -> None:
     if target.is_symlink():
         raise OutputError(f"{target} is a link to {target.readlink()}: give the name of what it points to")
+    if is_stream(target):
+        raise OutputError(f"{target} is a pipe or a device, which no output replaces: choose another name")
     if target.exists() and not overwrite:
         raise OutputError(f"{target} exists: choose another name, remove it, or add `overwrite=True`")
 
