@@ -1,7 +1,7 @@
 """The learned descriptor: its towns, its trainings, and the shipped weights beside them.
 
-The first seed makes the weights that come with evplace: on one core 11 minutes of towns and 20 of training,
-and 20 more for each further seed. Another processor rounds otherwise, and ends in other weights. How often
+The first seed makes the weights that come with evplace: on one core 25 minutes of towns and 50 of training,
+and 50 more for each further seed. Another processor rounds otherwise, and ends in other weights. How often
 the images of unseen towns and halls are found again says what they are worth.
 """
 
