@@ -7,6 +7,7 @@ damaged recording's good part was used. Errors that evplace raises on purpose ar
 
 from __future__ import annotations
 
+import _thread
 import ast
 import contextlib
 import difflib
@@ -29,6 +30,8 @@ NO_OUTPUT = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EBADF)
 """How the system says that nothing more can be printed."""
 SIGNALED = 128
 """Added to a signal's number, this is the exit code of what it ended, as shells have it."""
+AGAIN_S = 0.05
+"""So long after a library passed over the wish for an end, it is asked for again."""
 
 
 class _Stopped(KeyboardInterrupt):
@@ -68,12 +71,25 @@ def main(argv: list[str] | None = None) -> int:
 
 @contextlib.contextmanager
 def _stoppable() -> Iterator[None]:
-    """Within the block, being asked to end is as Ctrl-C is: what was half-written goes."""
+    """Within the block, being asked to end is as Ctrl-C is: what was half-written goes.
+
+    An exception in what C code calls back, such as a compiler's, goes no further: Python shows it, and the
+    work goes on. There the end is asked for once more.
+    """
 
     def stop(number: int, _: object) -> None:
         for each in numbers:  # the end is on its way: it is not asked for twice
             signal.signal(each, signal.SIG_IGN)
         raise _Stopped(number)
+
+    def passed_over(raised: Any) -> None:
+        if not isinstance(raised.exc_value, KeyboardInterrupt):
+            show(raised)
+            return
+        number = raised.exc_value.number if isinstance(raised.exc_value, _Stopped) else signal.SIGINT
+        if number in numbers:
+            signal.signal(number, stop)
+        threading.Timer(AGAIN_S, _thread.interrupt_main, (number,)).start()
 
     known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
     is_main = threading.current_thread() is threading.main_thread()
@@ -81,9 +97,11 @@ def _stoppable() -> Iterator[None]:
     numbers = [number for number in known if is_main and signal.getsignal(number) is signal.SIG_DFL]
     for number in numbers:
         signal.signal(number, stop)
+    show, sys.unraisablehook = sys.unraisablehook, passed_over
     try:
         yield
     finally:
+        sys.unraisablehook = show
         for number in numbers:
             signal.signal(number, signal.SIG_DFL)
 
