@@ -24,7 +24,7 @@ from evplace.sources.readers._ros import PACKED
 from evplace.testing._readers import cut_at, flipped
 
 SIZE: Size = (240, 180)
-MARKING = ["aedat4", "dat", "es", "evt2", "evt21", "evt3", "ros1", "ros2_db3", "ros2_mcap"]
+MARKING = ["dat", "es", "evt2", "evt21", "evt3", "ros1", "ros2_db3", "ros2_mcap"]
 """The formats whose readers mark."""
 DAMAGES = 25
 """Cuts and flips of each file."""

@@ -16,8 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
-from evplace.sources.readers._canvas import Canvas, Sink, compiled, put, sink_of
+from evplace.sources.readers._canvas import Canvas
 from evplace.sources.readers._ros2_files import ZSTD
 from evplace.sources.readers._ros_encodings import ENCODINGS, SINCE_EPOCH, Bytes, Encoding
 from evplace.sources.readers._source import Block, Hints, Source, gathered, joined, ordered, printable
@@ -204,31 +205,22 @@ class Packets:
 class _Arrays:
     """dvs_msgs/EventArray: one struct an event, with a time stamp of its own."""
 
-    def __init__(self, aligned: bool, canvas: Canvas | None = None) -> None:
-        self._aligned, self._canvas = aligned, canvas
+    def __init__(self, aligned: bool, _: Canvas | None = None) -> None:
+        self._aligned = aligned
         self.notes: list[str] = []
 
     def __call__(self, data: Bytes) -> Block:
-        return joined([self._block(events) for events in self._runs(data)])
-
-    def _runs(self, data: Bytes) -> list[NDArray[Any]]:
-        """The events as structs of one layout each; ValueError where the message is too short for them."""
         fields = Fields(data, self._aligned)
         fields.header()
         fields.take("I"), fields.take("I")
         count = fields.take("I")
         start = fields.position
         if not self._aligned:
-            return [np.frombuffer(data, PACKED, count, start)]
+            return _block(np.frombuffer(data, PACKED, count, start))
         if count and start % 4 == 0:  # only the first event can start there: it is two bytes shorter
             first = np.frombuffer(data, PACKED, 1, start)
-            return [first, _aligned_events(data, count - 1, start + 14)]
-        return [_aligned_events(data, count, start)]
-
-    def _block(self, events: NDArray[Any]) -> Block:
-        sink = sink_of(self._canvas, len(events))
-        _decode(events, sink)
-        return sink.block()
+            return joined([_block(first), _block(_aligned_events(data, count - 1, start + 14))])
+        return _block(_aligned_events(data, count, start))
 
 
 def _aligned_events(data: Bytes, count: int, start: int) -> NDArray[Any]:
@@ -238,10 +230,24 @@ def _aligned_events(data: Bytes, count: int, start: int) -> NDArray[Any]:
     return np.ndarray((count,), ALIGNED, data, min(start, len(data)), (STEP,))
 
 
-@compiled
-def _decode(events: NDArray[Any], sink: Sink) -> None:
-    """Hand on the events of structs of either layout."""
+def _block(events: NDArray[Any]) -> Block:
+    count = len(events)
+    t_us, x, y = np.empty(count, np.int64), np.empty(count, np.uint16), np.empty(count, np.uint16)
+    p = np.empty(count, np.bool_)
+    _split(events, t_us, x, y, p)
+    return Block(t_us, x, y, p)
+
+
+@njit(cache=True)
+def _split(
+    events: NDArray[Any],
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.bool_],
+) -> None:
+    """Fill the arrays from structs of either layout: as they lie, faster than event by event to a canvas."""
     for i in range(len(events)):
         event = events[i]
-        t_us = np.int64(event["s"]) * 1_000_000 + np.int64(event["ns"]) // 1000
-        put(sink, t_us, event["x"], event["y"], event["p"] != 0)
+        t_us[i] = np.int64(event["s"]) * 1_000_000 + np.int64(event["ns"]) // 1000
+        x[i], y[i], p[i] = event["x"], event["y"], event["p"] != 0

@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.compiled import njit
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.core.events import Size
-from evplace.sources.readers._canvas import Canvas, Sink, compiled, put, sink_of
 from evplace.sources.readers._source import Block, Hints, Source, gathered, numbered, printable
 from evplace.sources.readers._unpack import LIMIT, UnpackError, unpack
 
@@ -59,8 +59,7 @@ def read(path: Path, hints: Hints) -> Source:
         ) from error
     cameras = {number: stream.camera for number, stream in header.streams.items()}
     number, streams = numbered(path, cameras, hints.stream)
-    blocks = partial(_blocks, path, header, number)
-    return Source(header.streams[number].size, blocks, streams=streams, onto=blocks)
+    return Source(header.streams[number].size, partial(_blocks, path, header, number), streams=streams)
 
 
 def _header(path: Path) -> _Header:
@@ -111,11 +110,11 @@ def _stream(node: ElementTree.Element) -> _Stream:
     return _Stream(size, printable(node.findtext("./node[@name='info']/attr[@key='source']") or ""))
 
 
-def _blocks(path: Path, header: _Header, number: int, canvas: Canvas | None = None) -> Iterator[Block]:
-    return gathered(_packets(path, header, number, canvas))
+def _blocks(path: Path, header: _Header, number: int) -> Iterator[Block]:
+    return gathered(_packets(path, header, number))
 
 
-def _packets(path: Path, header: _Header, number: int, canvas: Canvas | None) -> Iterator[Block]:
+def _packets(path: Path, header: _Header, number: int) -> Iterator[Block]:
     end = path.stat().st_size
     if header.end is not None and header.end < end:
         end = header.end
@@ -130,7 +129,7 @@ def _packets(path: Path, header: _Header, number: int, canvas: Canvas | None) ->
                 file.seek(length, 1)
                 continue
             try:
-                yield _packet(unpack(file.read(length), header.compression), canvas)
+                yield _packet(unpack(file.read(length), header.compression))
             except (UnpackError, struct.error, ValueError) as error:
                 raise DamagedRecordingError(f"{path}: the packet at byte {position}: {error}") from error
     if header.end is not None and header.end > end:
@@ -139,31 +138,42 @@ def _packets(path: Path, header: _Header, number: int, canvas: Canvas | None) ->
         )
 
 
-def _packet(data: bytes | bytearray, canvas: Canvas | None) -> Block:
+def _packet(data: bytes | bytearray) -> Block:
     """The events of one EventPacket; ValueError or struct.error where it is damaged."""
     root = 4 + struct.unpack_from("<I", data, 4)[0]
     offset = _field(data, root, 0, "<I", 0)
     if offset == 0:
-        return sink_of(canvas, 0).block()
+        return Block(
+            np.empty(0, np.int64), np.empty(0, np.uint16), np.empty(0, np.uint16), np.empty(0, np.bool_)
+        )
     vector = _field_place(data, root, 0) + offset
     count = struct.unpack_from("<I", data, vector)[0]
     if count * EVENT_BYTES > min(len(data), LIMIT):
         raise ValueError(f"it claims {count} events")
     words = np.frombuffer(data, "<u8", 2 * count, vector + 4)
-    sink = sink_of(canvas, count)
-    _decode(words, sink)
-    return sink.block()
+    t_us, x, y = np.empty(count, np.int64), np.empty(count, np.uint16), np.empty(count, np.uint16)
+    p = np.empty(count, np.bool_)
+    _split(words, t_us, x, y, p)
+    return Block(t_us, x, y, p)
 
 
-@compiled
-def _decode(words: NDArray[np.uint64], sink: Sink) -> None:
-    """Hand on events of 16 bytes: 64 bits of time, 16 of x, 16 of y, 8 of polarity, 24 unused.
+@njit(cache=True)
+def _split(
+    words: NDArray[np.uint64],
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.bool_],
+) -> None:
+    """Fill the arrays from 16 bytes an event: 64 bits of time, 16 of x, 16 of y, 8 of polarity, 24 unused.
 
     A negative column or row becomes one beyond any sensor, and is dropped as such.
     """
-    for i in range(0, len(words), 2):
-        rest = np.int64(words[i + 1])
-        put(sink, np.int64(words[i]), rest & 0xFFFF, rest >> 16 & 0xFFFF, rest >> 32 & 0xFF != 0)
+    for i in range(len(t_us)):
+        t_us[i] = np.int64(words[2 * i])
+        rest = words[2 * i + 1]
+        x[i], y[i] = rest & np.uint64(0xFFFF), rest >> np.uint64(16) & np.uint64(0xFFFF)
+        p[i] = rest >> np.uint64(32) & np.uint64(0xFF) != 0
 
 
 def _field_place(table: bytes | bytearray, root: int, number: int) -> int:
