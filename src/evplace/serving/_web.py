@@ -127,7 +127,9 @@ class _Answers:
         try:
             async with _until_gone(socket):
                 while True:
-                    await asyncio.wait_for(socket.send_text(await listener.get()), SEND_S)
+                    text = await listener.get()
+                    async with asyncio.timeout(SEND_S):
+                        await socket.send_text(text)
         finally:
             self._hub.leave(listener)
 
@@ -144,7 +146,8 @@ class _Answers:
                 last = picture
                 height, width = picture.grey.shape
                 data = struct.pack("<qHH", picture.t_us, width, height) + picture.grey.tobytes()
-                await asyncio.wait_for(socket.send_bytes(data), SEND_S)
+                async with asyncio.timeout(SEND_S):
+                    await socket.send_bytes(data)
                 await asyncio.sleep(PICTURE_S)
 
 
