@@ -148,6 +148,9 @@ class Route(NamedTuple):
     """What the map's images usually show, as in Seen."""
     learned: Learned | None = None
     """What `learn` has given for this map; None where it was not asked."""
+    own: NDArray[np.int64] | None = None
+    """(images,) the item of each of the images that `learn` may ask rows of; None where these are the items'
+    own, one each, and a row also says how like itself an image is."""
 
 
 class Following(Protocol):
@@ -165,7 +168,7 @@ class RouteMatcher(Protocol):
     """A Matcher that also uses where a map's items are, and when and how much a query saw."""
 
     def learn(self, route: Route, rows: Callable[[slice], Rows]) -> Learned:
-        """What the map's own images tell; `rows` gives the score rows of some of its items' own images."""
+        """What the map's own images tell; `rows` gives the score rows of some of them: see Route.own."""
 
     def follow(self, route: Route, distances: bool = False) -> Following:
         """Begin a traverse."""

@@ -17,6 +17,7 @@ from evplace.matchers import Matcher, RouteMatcher, Rows
 from evplace.matchers.bayes import Bayes
 from evplace.matchers.local import Local
 from evplace.placemap import Items, PlaceMap
+from evplace.placemap._parts import JoinedRows
 from evplace.places import Places
 from evplace.scorers import Descriptor, Learned, Learning, Scorer, scorer_of, usable
 from evplace.scorers.fused import Fused
@@ -43,7 +44,7 @@ def train(
     """
     named = default_scorer(preset) if scorer is None else scorer
     part: Scorer | Descriptor = families.make("scorers", named, preset, settings)
-    made = _learned(reference, places, part, learning or Learning())
+    made = learned_map(reference, places, part, learning or Learning())
     if matcher is None:
         by = preset if preset in Local.presets and made.items.are_places else None
         return calibrate(made, Local.presets[by] if by else None)
@@ -74,28 +75,59 @@ def calibrate(place_map: PlaceMap, matcher: Matcher | None = None) -> PlaceMap:
     """
     chosen = matcher or place_map.matcher or default_matcher(place_map)
     place_map = dataclasses.replace(place_map, matcher=chosen, learned=None)
-    images = place_map.references
-    if images is None or not isinstance(chosen, RouteMatcher):
+    if place_map.items.are_places or place_map.images_of([0]) is None or not isinstance(chosen, RouteMatcher):
         return place_map
-    with families.blaming("scorers", place_map.scorer):
-        opened = scorer_of(place_map.scorer).open(place_map.content)
-
-    def rows(items: slice) -> Rows:
-        with families.blaming("scorers", place_map.scorer):
-            return opened.rows(np.asarray(images[items]))
-
+    own = OwnRows(place_map)
+    route = place_map.route()._replace(content=_content(place_map), own=own.item)
     with families.blaming("matchers", chosen):
-        learned = chosen.learn(place_map.route()._replace(content=_content(place_map, images)), rows)
+        learned = chosen.learn(route, own.rows)
     return dataclasses.replace(place_map, learned=learned or None)
 
 
-def _content(place_map: PlaceMap, images: NDArray[np.uint8]) -> float:
+class OwnRows:
+    """The score rows of a map's own images: those of all its drives, one behind the other."""
+
+    def __init__(self, place_map: PlaceMap) -> None:
+        self._map = place_map
+        self._scoring = place_map.scoring()
+        self.item: NDArray[np.int64] | None = None
+        """(images,) the item of each; None of a map of one drive, whose items they are."""
+        if place_map.parts:
+            self.item = np.concatenate([part.item for part in place_map.parts])
+            self._first = np.cumsum([0, *(len(part.item) for part in place_map.parts)])
+
+    def rows(self, images: slice) -> Rows:
+        """(n, items) of some of them. Of several drives, none counts that an image has with itself."""
+        with families.blaming("scorers", self._map.scorer):
+            if isinstance(self._scoring, JoinedRows):
+                return np.concatenate([self._others(at) for at in range(*images.indices(self._first[-1]))])
+            references = self._map.references
+            assert references is not None
+            return self._scoring.rows(np.asarray(references[images]))
+
+    def _others(self, at: int) -> Rows:
+        """(1, items) of one image of a map of several drives."""
+        assert isinstance(self._scoring, JoinedRows)
+        drive = int(np.searchsorted(self._first, at, "right")) - 1
+        image = self._map.parts[drive].map.images_of([at - self._first[drive]])
+        assert image is not None
+        rows = self._scoring.of_references(image)
+        rows[0, at] = rows[0].min()
+        return self._scoring.best(rows)
+
+
+def _content(place_map: PlaceMap) -> float:
     """What the map's references usually show; NaN of camera images, which no longer follow one another."""
-    of_events = place_map.recipe is not None and place_map.recipe.kind == "events"
-    return float(np.median(activity(images, of_events=True))) if of_events else math.nan
+    if place_map.recipe is None or place_map.recipe.kind != "events":
+        return math.nan
+    maps = [part.map for part in place_map.parts] or [place_map]
+    shown = [activity(one.references, of_events=True) for one in maps if one.references is not None]
+    return float(np.median(np.concatenate(shown)))
 
 
-def _learned(reference: Traverse, places: Places, part: Scorer | Descriptor, learning: Learning) -> PlaceMap:
+def learned_map(
+    reference: Traverse, places: Places, part: Scorer | Descriptor, learning: Learning
+) -> PlaceMap:
     """The map as its scorer learns it."""
     _, used = usable(reference, places)
     track = reference.track
