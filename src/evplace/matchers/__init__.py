@@ -177,6 +177,14 @@ class RouteMatcher(Protocol):
         """The answers for all queries of a traverse, once all are known."""
 
 
+@runtime_checkable
+class LearnsMore(Protocol):
+    """A RouteMatcher that need not learn a map anew where some images come to it."""
+
+    def learn_more(self, before: Learned, route: Route, rows: Callable[[slice], Rows]) -> Learned:
+        """As `learn`, of the images that are new; `before` is what it has learned of the others."""
+
+
 class Sweep(NamedTuple):
     """One parameter of a matcher over many values."""
 
@@ -219,8 +227,8 @@ def open_matcher(
 from evplace.matchers._rows import Answers, RowCheck  # noqa: E402 - they are made of what stands above
 
 __all__ = [
-    "Answer", "Answers", "Estimate", "Following", "Judge", "Learned", "Matcher", "Matching", "Path", "Route",
-    "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep", "open_matcher", "stepped",
+    "Answer", "Answers", "Estimate", "Following", "Judge", "Learned", "LearnsMore", "Matcher", "Matching",
+    "Path", "Route", "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep", "open_matcher", "stepped",
 ]  # fmt: skip
 
 

@@ -45,6 +45,8 @@ TRIED = 6000
 """Images that are localised in all trials, about."""
 MOST_IMAGES = 3000
 """Of the map's own, that are localised on it: the first ones of a longer map."""
+MOST_SCORES = 20_000_000
+"""From which the density of wrong scores is made; of more, every second, third ... is taken."""
 
 
 class Strangers(NamedTuple):
@@ -70,6 +72,17 @@ def measured(route: Route, rows: Callable[[slice], Rows]) -> Learned:
     }
 
 
+def together(before: Learned, more: Learned) -> Learned:
+    """What was measured of a map, and of some more of it; each counts by its images from places cut out."""
+    if not more:
+        return before
+    many = np.array([len(one[LIVE]) for one in (before, more)]) / (len(before[LIVE]) + len(more[LIVE]))
+    wrong = np.log(many @ np.exp(np.stack([before[WRONG], more[WRONG]])))
+    content = many @ np.stack([before[CONTENT], more[CONTENT]])
+    both = {name: np.sort(np.concatenate([before[name], more[name]])) for name in (LIVE, LATE)}
+    return {WRONG: wrong, CONTENT: content, **both}
+
+
 def strangers(route: Route, rows: Callable[[slice], Rows]) -> Strangers | None:
     """Localise a map's images on what is left of it; None for a map too short or too small for that."""
     ways = Ways.of(route)
@@ -82,14 +95,15 @@ def strangers(route: Route, rows: Callable[[slice], Rows]) -> Strangers | None:
     if route.own is None:
         own[at, at] = own.min(axis=1)  # an image tells nothing of itself
     learned = {WRONG: _wrong(ways, own, at), CONTENT: np.array([route.content])}
-    unknown = [_trial(route, own, at, learned, keep) for keep in _cuts(ways)]
+    unknown = [_trial(route, ways, own, at, learned, keep) for keep in _cuts(ways)]
     live, late = (np.concatenate(column) for column in zip(*unknown, strict=True))
     return None if len(live) < LEAST_UNKNOWN else Strangers(learned, live, late)
 
 
 def _wrong(ways: Ways, own: Rows, at: Ints) -> Floats:
     """The density of z-scores of other places."""
-    scores = [robust_z(row)[_elsewhere(ways, item)] for row, item in zip(own, at, strict=True)]
+    every = -(-own.size // MOST_SCORES)
+    scores = [robust_z(row)[_elsewhere(ways, item)][::every] for row, item in zip(own, at, strict=True)]
     return around.density(np.concatenate(scores).astype(np.float64))
 
 
@@ -108,9 +122,11 @@ def _cuts(ways: Ways) -> Iterator[Bools]:
         yield (np.searchsorted(ends, ways.way, "right") + trial) % 2 == 0
 
 
-def _trial(route: Route, own: Rows, at: Ints, learned: Learned, keep: Bools) -> tuple[Floats, Floats]:
+def _trial(
+    route: Route, whole: Ways, own: Rows, at: Ints, learned: Learned, keep: Bools
+) -> tuple[Floats, Floats]:
     """(unknown, features) live and late, of those of a map's images whose places are cut out."""
-    whole, part = Ways.of(route), Ways.of(_part(route, keep))
+    part = Ways.of(_part(route, keep))
     seen, rows = _driven(whole, at), own[:, keep]
     unknown = np.array([not _near(whole, keep, item) for item in at])
     live, late = traces.live(part, rows, seen, learned), traces.late(part, rows, seen, learned)

@@ -48,7 +48,7 @@ from evplace.placemap._files import (
 from evplace.placemap._files import MARK as MARK
 from evplace.placemap._parts import JoinedRows, Part, images_of
 from evplace.places import Places
-from evplace.scorers import REFERENCES, Content, Descriptor, OpenScorer, Scorer, scorer_of
+from evplace.scorers import REFERENCES, Content, Descriptor, OpenScorer, Scorer, opened_together, scorer_of
 from evplace.sources.cleaning import MaskSource
 from evplace.sources.tracks import Track
 
@@ -123,10 +123,9 @@ class PlaceMap:
     def scoring(self) -> OpenScorer:
         """What compares images with its items; PlaceMapError where its content is not what that needs."""
         with families.blaming("scorers", self.scorer):
-            scorer = scorer_of(self.scorer)
             if not self.parts:
-                return scorer.open(self.content)
-            opened = [scorer.open(part.map.content) for part in self.parts]
+                return scorer_of(self.scorer).open(self.content)
+            opened = opened_together(self.scorer, [part.map.content for part in self.parts])
             return JoinedRows(opened, [part.item for part in self.parts])
 
     def route(self, learned: bool = True) -> Route:

@@ -20,7 +20,7 @@ from evplace.core.errors import PlaceMapError, SettingsError, TraverseError
 from evplace.imaging.traverse import Traverse
 from evplace.placemap import Items, PlaceMap
 from evplace.placemap._parts import Part, places_in
-from evplace.placemap._training import calibrate, learned_map
+from evplace.placemap._training import calibrate, calibrate_more, learned_map
 from evplace.places import PlaceGrid, PlaceRuns, Places
 from evplace.scorers import Learning
 
@@ -43,8 +43,11 @@ def add(place_map: PlaceMap, *references: Traverse, names: Sequence[str] | None 
         learned = learned_map(moved, _places_of(moved, found), found.scorer, Learning())
         name = name_of(learned, "drive") if names is None else names[number]
         found = _joined(found, Part(_free_name(name, found), learned, np.zeros(0, np.int64)))
-    added = [part.name for part in found.parts[len(parts_of(place_map)) :]]
-    return calibrate(_noted(place_map, found, f"added {', '.join(added)}")) if added else place_map
+    known = len(parts_of(place_map))
+    added = ", ".join(part.name for part in found.parts[known:])
+    if not added:
+        return place_map
+    return calibrate_more(_noted(place_map, found, f"added {added}"), place_map.learned, known)
 
 
 def merge(*maps: PlaceMap) -> PlaceMap:
