@@ -91,6 +91,14 @@ class OfParts(Protocol):
         """See Scorer; with other objects for `parts`."""
 
 
+@runtime_checkable
+class Thins(Protocol):
+    """A Scorer that can do without some references."""
+
+    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content:
+        """What is left of a content that was learned, with these of its items."""
+
+
 class Remembering:
     """A descriptor that does not describe the last images anew."""
 
@@ -161,6 +169,13 @@ def opened_together(part: Scorer | Descriptor, contents: Sequence[Content]) -> l
         shared = {name: Remembering(one) for name, one in part.parts.items()}
         return [part.open(content, shared) for content in contents]
     return [scorer_of(part).open(content) for content in contents]
+
+
+def thinned(part: Scorer | Descriptor, content: Content, items: NDArray[np.int64]) -> Content | None:
+    """What is left of a content with these of its items; None where the part cannot do without the others."""
+    if isinstance(part, Thins):
+        return part.thinned(content, items)
+    return {REFERENCES: references_of(content)[items]} if set(content) == {REFERENCES} else None
 
 
 def usable(reference: Traverse, places: Places) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
