@@ -31,7 +31,7 @@ from evplace.matchers import State as StateOfAnswer
 from evplace.matchers._checks import check_answer, check_path
 from evplace.matchers._drives import follow, in_hindsight
 from evplace.placemap import PlaceMap, default_matcher
-from evplace.scorers import OpenScorer, Rows, scorer_of
+from evplace.scorers import OpenScorer, Rows
 from evplace.sources.cleaning import MaskSource, read_mask
 from evplace.sources.readers import Canvas
 
@@ -108,8 +108,8 @@ class Localizer:
         """The matcher with its settings; `reset` begins with it anew."""
         self.mask = mask
         """Pixels of the drive to leave out; it counts from the first packet of a drive."""
+        self.scorer: OpenScorer = place_map.scoring()
         with families.blaming("scorers", place_map.scorer):
-            self.scorer: OpenScorer = scorer_of(place_map.scorer).open(place_map.content)
             self._distances = bool(self.scorer.distances)
         self._route = place_map.route(learned=type(self.matcher) is type(place_map.matcher))
         self.reset()

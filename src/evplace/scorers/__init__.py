@@ -7,7 +7,7 @@ the images themselves are the map, and an image scores by the product of its vec
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -79,6 +79,32 @@ class Descriptor(Protocol):
         """(n, h, w) or (n, h, w, C) uint8 -> (n, dimensions); the product of two vectors is a score."""
 
 
+@runtime_checkable
+class OfParts(Protocol):
+    """A Scorer that describes images by descriptors, which contents that are opened together can share."""
+
+    @property
+    def parts(self) -> Mapping[str, Descriptor]:
+        """The descriptors by their names."""
+
+    def open(self, content: Content, parts: Mapping[str, Descriptor] | None = None) -> OpenScorer:
+        """See Scorer; with other objects for `parts`."""
+
+
+class Remembering:
+    """A descriptor that does not describe the last images anew."""
+
+    def __init__(self, descriptor: Descriptor) -> None:
+        self._descriptor = descriptor
+        self._last: tuple[NDArray[np.uint8], Vectors] | None = None
+
+    def describe(self, images: NDArray[np.uint8]) -> Vectors:
+        """See Descriptor."""
+        if self._last is None or not np.array_equal(self._last[0], images):
+            self._last = images.copy(), self._descriptor.describe(images)
+        return self._last[1]
+
+
 @dataclass(frozen=True)
 class Described:
     """The scorer that a descriptor makes: the map is its images."""
@@ -127,6 +153,14 @@ def in_blocks(vectors_of: Callable[[NDArray[np.uint8]], Vectors], images: NDArra
 def scorer_of(part: Scorer | Descriptor) -> Scorer:
     """The part itself, or the scorer that a descriptor makes."""
     return Described(part) if isinstance(part, Descriptor) else part
+
+
+def opened_together(part: Scorer | Descriptor, contents: Sequence[Content]) -> list[OpenScorer]:
+    """The part over each of some contents; an image that all are asked about is described once, if can be."""
+    if isinstance(part, OfParts):
+        shared = {name: Remembering(one) for name, one in part.parts.items()}
+        return [part.open(content, shared) for content in contents]
+    return [scorer_of(part).open(content) for content in contents]
 
 
 def usable(reference: Traverse, places: Places) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -89,11 +89,12 @@ class Fused:
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
 
-    def open(self, content: Content) -> OpenScorer:
-        """See Scorer."""
+    def open(self, content: Content, parts: Mapping[str, Descriptor] | None = None) -> OpenScorer:
+        """See OfParts."""
         items = len(references_of(content))
         _check_versions(content, _versions(self))
-        return _FusedRows([(name, part, _read(content, name, items)) for name, part in self.parts.items()])
+        found = (parts or self.parts).items()
+        return _FusedRows([(name, part, _read(content, name, items)) for name, part in found])
 
 
 Fused.presets = {"best": Fused()}
