@@ -79,20 +79,25 @@ class Searcher(Protocol):
 
 def kept(searcher: Searcher, searching: Searching) -> dict[str, NDArray[Any] | bytes]:
     """All that `opened` needs."""
+    content = searching.content()
     about = {
         "format": FORMAT,
         "searcher": families.name_of("searchers", searcher),
         "settings": to_dict(searcher),
         "items": searching.items,
         "dimensions": searching.dimensions,
+        "shapes": {name: list(np.shape(value)) for name, value in content.items()},
     }
-    return {**searching.content(), ABOUT: json.dumps(about, indent=1).encode()}
+    return {**content, ABOUT: json.dumps(about, indent=1).encode()}
 
 
 def opened(content: Content, items: int, dimensions: int) -> Searching:
     """Over what `kept` gave; PlaceMapError where it is not such, or not of so many items and dimensions."""
     about = _about(content)
     searcher: Searcher = families.make("searchers", about["searcher"], values=about["settings"])
+    for name, shape in about["shapes"].items():
+        if list(np.shape(content.get(name))) != shape:
+            raise damaged(f"'{name}' is of shape {np.shape(content.get(name))} where {shape} is said")
     searching = searcher.open(content)
     found, said = (searching.items, searching.dimensions), (about.get("items"), about.get("dimensions"))
     for held, what in ((said, "says"), (found, "holds")):
@@ -141,8 +146,9 @@ def _about(content: Content) -> dict[str, Any]:
             f"the map's index has the format {found.get('format')!r}, this version reads {FORMAT}: train "
             "the map again, or use the evplace that it was made with"
         )
-    if not isinstance(found.get("searcher"), str) or not isinstance(found.get("settings"), dict):
-        raise damaged(f"{ABOUT} names no searcher")
+    kinds = {"searcher": str, "settings": dict, "shapes": dict}
+    if not all(isinstance(found.get(name), kind) for name, kind in kinds.items()):
+        raise damaged(f"{ABOUT} lacks {', '.join(kinds)}, or one is of a wrong kind")
     return found
 
 
