@@ -96,8 +96,9 @@ def opened(content: Content, items: int, dimensions: int) -> Searching:
     about = _about(content)
     searcher: Searcher = families.make("searchers", about["searcher"], values=about["settings"])
     for name, shape in about["shapes"].items():
-        if list(np.shape(content.get(name))) != shape:
-            raise damaged(f"'{name}' is of shape {np.shape(content.get(name))} where {shape} is said")
+        array = content.get(name)
+        if not isinstance(array, np.ndarray) or list(array.shape) != shape:
+            raise damaged(f"'{name}' is not of the shape {shape} that {ABOUT} says")
     searching = searcher.open(content)
     found, said = (searching.items, searching.dimensions), (about.get("items"), about.get("dimensions"))
     for held, what in ((said, "says"), (found, "holds")):
