@@ -23,8 +23,8 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places scorers matchers placemap localizer serving evaluation doctor "
-        "testing cli"
+        "core sources imaging drives places searchers scorers matchers placemap localizer serving evaluation "
+        "doctor testing cli"
     ),
     "evplace.core": "errors events grey zscores settings families storage workers drawing",
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",
@@ -33,7 +33,8 @@ ORDER = {
         "traverse sheets"
     ),
     "evplace.drives": "datasets to_traverse",
-    "evplace.scorers": "_search _reduction _compressed _distances _seqslam_images _network",
+    "evplace.searchers": "_loops _turned exact int8 bits faiss",
+    "evplace.scorers": "_reduction _compressed _indexed _distances _seqslam_images _network",
     "evplace.scorers._network": "network_onnx network augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
     "evplace_lab": "city descriptor reproduction report cli",

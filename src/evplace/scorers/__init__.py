@@ -19,7 +19,7 @@ from evplace.core import families
 from evplace.core.errors import PartError, PlaceMapError, TraverseError
 from evplace.imaging.traverse import Traverse
 from evplace.places import Places
-from evplace.scorers._search import Exact
+from evplace.searchers.exact import ExactSearch
 
 Rows = NDArray[np.float32]
 """(queries, items) scores."""
@@ -59,6 +59,14 @@ class OpenScorer(Protocol):
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         """(n, h, w) or (n, h, w, C) uint8 -> (n, items)."""
+
+
+@runtime_checkable
+class ComparesSome(Protocol):
+    """An OpenScorer that can also compare with some items alone, which is faster."""
+
+    def some(self, images: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        """(n, len(items)) what `rows` would give for these items."""
 
 
 class Scorer(Protocol):
@@ -125,10 +133,13 @@ class _DescribedRows:
 
     def __init__(self, descriptor: Descriptor, references: NDArray[np.uint8]) -> None:
         self._descriptor = descriptor
-        self._search = Exact(in_blocks(self._vectors, references))
+        self._search = ExactSearch(in_blocks(self._vectors, references))
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         return self._search.rows(self._vectors(images))
+
+    def some(self, images: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        return self._search.scores(self._vectors(images), items)
 
     def _vectors(self, images: NDArray[np.uint8]) -> Vectors:
         vectors = self._descriptor.describe(images)
