@@ -24,7 +24,7 @@ from typing import Annotated
 
 import tyro
 
-from evplace.cli._matcher import MatcherFlags, note_matches
+from evplace.cli._matcher import MatcherFlags, matches_noted
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.cli._recording import DriveFlags
 from evplace.core.errors import DamagedRecordingError, SettingsError
@@ -136,7 +136,8 @@ def run(args: Args) -> int:
         writer.writerow(COLUMNS)
         for match in matches:
             writer.writerow(_row(match, where.map))
-    note_matches(where, matches.matches, matches.accepted)
+    for text in matches_noted(where, matches.matches, matches.accepted):
+        note(text)
     if matches.fault is not None:
         note(f"{matches.fault}; the good part was localised")
     return USED_GOOD_PART if matches.fault is not None else 0

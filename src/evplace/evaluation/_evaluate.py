@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Callable
+from pathlib import Path as FilePath
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import EvaluationError
-from evplace.evaluation import ItemImages, Result, measure, sample
+from evplace.core.tables import MEMORY_BYTES
+from evplace.evaluation import RECALLS_AT, ItemImages, Result, hits_at, measure, sample
+from evplace.evaluation._checkpoint import Checkpoint
+from evplace.evaluation._measures import Floats
 from evplace.evaluation.truth import Truth, by_cells, by_places, by_radius, only_views
 from evplace.imaging.traverse import Traverse
-from evplace.localizer import Answered, Answers, Localizer
+from evplace.localizer import Answered, Answering, Answers, Localizer
+from evplace.matchers import Path
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns
+from evplace.scorers import Rows
 from evplace.sources.tracks import Track
 
 Rule = Literal["places", "view", "radius"]
+Progress = Callable[[int, int, str], None]
+"""Called with (queries done, queries in all, what is being done)."""
 MARGIN_M = 1000.0
 """A query further than this from all of the map's ground is taken for a mistake."""
 RADIUS_M = 25.0
@@ -33,6 +42,9 @@ def evaluate(
     reference: Traverse | None = None,
     answers: Answers = "live",
     radius_m: float = RADIUS_M,
+    keep_scores: bool | None = None,
+    progress: Progress | None = None,
+    checkpoint: FilePath | None = None,
 ) -> Result:
     """Localise the whole `query` and measure the answers: "live" ones, or those of "hindsight".
 
@@ -40,23 +52,72 @@ def evaluate(
     eight neighbours (paper, section 3.4), and a query is seen where the map has any such cell. By view it is
     seen only where the map holds a reference within 20 m that looks within 34 degrees the same way. By radius
     an answer is right at most `radius_m` metres from the query. `reference`, the map's own drive, lends a
-    network's map the images of the samples; a map of images has them. Raises EvaluationError where query and
-    map share no ground, or the truth or reference do not fit; PlaceMapError where the query was not made as
-    the map was.
+    network's map the images of the samples; a map of images has them.
+
+    The score rows are kept where `keep_scores` says so; by default where memory holds them. Live, a call that
+    was stopped goes on from the file `checkpoint`, which is written every minute and removed at the end.
+    Raises EvaluationError where query and map share no ground, or the truth or reference do not fit;
+    PlaceMapError where the query was not made as the map was.
     """
     started = time.perf_counter()
     place_map = localizer.map
     show = item_images(place_map, query, reference)
     truth = truth or truth_of(place_map, query, rule, radius_m)
-    result = judged(localizer, query, localizer.answers(query, answers), truth, answers)
+    cells = len(query) * len(place_map.items)
+    keep = 4 * cells <= MEMORY_BYTES if keep_scores is None else keep_scores
+    answering = Answering(localizer, query, answers, keep=keep)
+    may_stop = checkpoint is not None and answers == "live" and not (keep and 4 * cells > MEMORY_BYTES)
+    kept = Checkpoint(checkpoint, localizer, query, truth, answers) if checkpoint and may_stop else None
+    hits = _hits(answering, query, truth, progress, kept)
+    path, rows = answering.path(), answering.rows if keep else None
+    result = _measured(localizer, query, truth, answers, path, answering.delay, rows, hits)
+    if kept is not None:
+        kept.remove()
     result = dataclasses.replace(result, took_s=round(time.perf_counter() - started, 3))
     return sample(result, query.images, show) if show is not None else result
+
+
+def _hits(
+    answering: Answering, query: Traverse, truth: Truth, progress: Progress | None, kept: Checkpoint | None
+) -> Floats:
+    """(queries, N, 3) `hits_at` of each query's row, which is seen once and forgotten."""
+    hits = np.zeros((len(query), len(RECALLS_AT), 3))
+    state = kept.found() if kept is not None else None
+    if state is not None:
+        answering.resume(state["answering"])
+        hits[:] = state["hits"]
+    for queries, rows in answering:
+        first, last = int(queries[0]), int(queries[-1])
+        right = truth.block(slice(first, last + 1))[queries - first]
+        hits[queries] = hits_at(rows, right, RECALLS_AT)
+        if progress is not None:
+            progress(last + 1, len(query), "")
+        if kept is not None and kept.is_due:
+            kept.save({"answering": answering.state, "hits": hits})
+    for at in np.flatnonzero(query.counts == 0):  # no image: by chance
+        hits[at] = hits_at(np.zeros((1, truth.n_items)), truth.block(slice(at, at + 1)), RECALLS_AT)[0]
+    return hits
 
 
 def judged(
     localizer: Localizer, query: Traverse, answered: Answered, truth: Truth, answers: Answers
 ) -> Result:
     """The figures of what `localizer` has answered, by one truth."""
+    path, rows, delay = answered
+    return _measured(localizer, query, truth, answers, path, delay, rows)
+
+
+def _measured(
+    localizer: Localizer,
+    query: Traverse,
+    truth: Truth,
+    answers: Answers,
+    path: Path,
+    delay: int,
+    rows: Rows | None,
+    hits: Floats | None = None,
+) -> Result:
+    """The figures of a path by one truth; of the rows' own, where these were not kept, by their hits."""
     place_map = localizer.map
     settings = {
         "answers": answers,
@@ -65,8 +126,8 @@ def judged(
         "query": query.info.get("source"),
     }
     return measure(
-        answered.path, truth, answered.rows, place_map.items.position, query.t_us, settings,
-        xy_in(place_map, query), answered.delay,
+        path, truth, rows, place_map.items.position, query.t_us, settings,
+        xy_in(place_map, query), delay, hits,
     )  # fmt: skip
 
 

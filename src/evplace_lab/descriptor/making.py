@@ -17,7 +17,7 @@ import numpy as np
 
 from evplace.core.settings import to_dict
 from evplace.core.storage import read_json
-from evplace.core.workers import run_all
+from evplace.core.workers import Workers, run_all
 from evplace.scorers import Learning
 from evplace.scorers.trained import ABOUT, WEIGHTS, DescriptorGraph
 from evplace_lab.descriptor.bursts import Bursts, BurstSettings, is_hall
@@ -48,8 +48,8 @@ class Recipe:
         return hashlib.sha256(f"{VERSION} {self.bursts}".encode()).hexdigest()[:12]
 
 
-def make_towns(folder: Path, recipe: Recipe, workers: int, progress: Progress) -> None:
-    """All towns that are not there yet, `workers` processes at a time."""
+def make_towns(folder: Path, recipe: Recipe, workers: Workers, progress: Progress) -> None:
+    """All towns that are not there yet."""
     seeds = [*range(recipe.towns), *UNSEEN]
     todo = [seed for seed in seeds if not town_file(folder, recipe, seed).exists()]
     jobs = [
@@ -63,7 +63,7 @@ def make_towns(folder: Path, recipe: Recipe, workers: int, progress: Progress) -
         done += 1
         progress(done, len(seeds), line)
 
-    run_all("evplace_lab.descriptor.worker", jobs, workers, said)
+    run_all("evplace_lab.descriptor.worker", jobs, workers, folder / "towns", said)
 
 
 def town_file(folder: Path, recipe: Recipe, seed: int) -> Path:

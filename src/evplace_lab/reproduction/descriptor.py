@@ -15,6 +15,7 @@ from typing import Any
 
 from evplace.core.errors import SettingsError
 from evplace.core.settings import make
+from evplace.core.workers import Workers
 from evplace.scorers.trained import FOLDER, DescriptorGraph
 from evplace_lab.descriptor.making import Recipe, judged, make_towns, train_seed
 from evplace_lab.reproduction import Choice, Table
@@ -27,7 +28,7 @@ FORMAT = "evplace-descriptor-1"
 
 
 def document(
-    out: Path, choice: Choice, workers: int, progress: Callable[[int, int, str], None] | None
+    out: Path, choice: Choice, workers: Workers, progress: Callable[[int, int, str], None] | None
 ) -> dict[str, Any]:
     """Make what is missing in `out`; a row for each seed, and one for the shipped weights.
 

@@ -1,0 +1,120 @@
+"""What a long evaluation keeps now and then, so that one that was stopped goes on where it was.
+
+A matcher's state is whatever it is: it is pickled. Only classes and arrays of those packages that the
+localizer is made of are read back, and only from a file of the same localizer, query and truth.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import pickle
+import time
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evplace import __version__
+from evplace.core import families
+from evplace.core.storage import new_file
+from evplace.evaluation.truth import Truth
+from evplace.imaging.traverse import Traverse
+from evplace.localizer import Localizer
+
+EVERY_S = 60.0
+"""Seconds between two."""
+BLOCK = 1024
+"""Images of a query that are read at once."""
+PLAIN = {
+    ("array", "_array_reconstructor"), ("array", "array"), ("collections", "deque"), ("builtins", "set"),
+    ("numpy", "dtype"), ("numpy", "ndarray"),
+}  # fmt: skip
+"""What a state may be made of besides the classes of parts."""
+OF_NUMPY = ("_reconstruct", "_frombuffer", "scalar")
+
+
+class Checkpoint:
+    """The file of an evaluation that is under way."""
+
+    def __init__(self, path: Path, localizer: Localizer, query: Traverse, truth: Truth, answers: str) -> None:
+        self._path, self._of = path, (localizer, query, truth, answers)
+        self._parts = {
+            type(part).__module__.partition(".")[0] for part in (localizer.matcher, localizer.map.scorer)
+        }
+        self._key: str | None = None
+        self._next = time.monotonic() + EVERY_S
+
+    @property
+    def is_due(self) -> bool:
+        """Whether it is time to save."""
+        return time.monotonic() >= self._next
+
+    def save(self, state: Mapping[str, Any]) -> None:
+        """Keep a state; where a matcher's cannot be kept, that is said once."""
+        try:
+            data = pickle.dumps({"key": self._same(), **state}, 5)
+        except (pickle.PicklingError, TypeError, AttributeError) as error:
+            matcher = families.described("matchers", self._of[0].matcher)
+            warnings.warn(f"{matcher} cannot be kept ({error}): a stopped call begins anew", stacklevel=2)
+            self._next = float("inf")
+            return
+        with new_file(self._path, overwrite=True) as partial:
+            partial.write_bytes(data)
+        self._next = time.monotonic() + EVERY_S
+
+    def found(self) -> dict[str, Any] | None:
+        """The state that was kept; None where there is none, or it is damaged or of something else."""
+        if not self._path.is_file():
+            return None
+        try:
+            with self._path.open("rb") as file:
+                state: dict[str, Any] = _Reader(file, self._parts).load()
+            return state if state["key"] == self._same() else None
+        except Exception:  # whatever bytes may raise that are no such state
+            return None
+
+    def remove(self) -> None:
+        """The evaluation is done."""
+        self._path.unlink(missing_ok=True)
+
+    def _same(self) -> str:
+        if self._key is None:
+            self._key = _key(*self._of)
+        return self._key
+
+
+class _Reader(pickle.Unpickler):
+    """Reads what `save` wrote, and calls nothing else."""
+
+    def __init__(self, file: Any, packages: set[str]) -> None:
+        super().__init__(file)
+        self._packages = packages | {"evplace"}
+
+    def find_class(self, module: str, name: str) -> Any:
+        """A class of a part, or an array."""
+        package = module.partition(".")[0]
+        known = (module, name) in PLAIN or (package == "numpy" and name in OF_NUMPY)
+        found = super().find_class(module, name) if known or package in self._packages else None
+        if not (known or isinstance(found, type)):
+            raise pickle.UnpicklingError(f"{module}.{name} is no part of a state")
+        return found
+
+
+def _key(localizer: Localizer, query: Traverse, truth: Truth, answers: str) -> str:
+    """A checksum of all that the answers and their figures depend on."""
+    place_map = localizer.map
+    about = [__version__, answers, place_map.settings, localizer.settings, truth.rule, truth.n_items]
+    found = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
+    for name, part in sorted([*place_map.content.items(), *(place_map.learned or {}).items()]):
+        found.update(name.encode())
+        found.update(part if isinstance(part, bytes) else np.ascontiguousarray(part).data)
+    for array in (query.t_us, query.counts, truth.judged):
+        found.update(np.ascontiguousarray(array).data)
+    for start in range(0, len(query), BLOCK):
+        found.update(np.ascontiguousarray(query.images[start : start + BLOCK]).data)
+    for _, right in truth.blocks():
+        found.update(np.packbits(right).data)
+    return found.hexdigest()
