@@ -39,7 +39,7 @@ from evplace.imaging.windows import WindowSettings
 from evplace.matchers.local import Local
 from evplace.placemap import MARK, default_scorer, train
 from evplace.places import PlaceGrid, PlaceRuns, Places
-from evplace.scorers import Descriptor, Learning, Scorer
+from evplace.scorers import Descriptor, Learning, Scorer, require
 from evplace.scorers.network import TrainSettings
 from evplace.sources.cleaning import CleaningSettings
 
@@ -92,6 +92,7 @@ def run(args: Args) -> int:
     """Learn and save the map."""
     check_new_folder(args.out, args.overwrite, MARK)  # said before the training, not after it
     scorer = _scorer(args)
+    require(scorer)
     reference = open_traverse(
         args.source, args.opened_track(), spacing=spacing_given(args), mask=args.mask,
         **(args.reading() | recipe_settings(args)),

@@ -62,7 +62,11 @@ class OpenScorer(Protocol):
 
 
 class Scorer(Protocol):
-    """A way to compare, with its settings. A class may have `presets`: names and objects of it."""
+    """A way to compare, with its settings. A class may have `presets`: names and objects of it.
+
+    One that learns by a package that may be missing has `require()`, which raises MissingExtraError then: it
+    is asked before the work.
+    """
 
     def learn(self, reference: Traverse, places: Places, learning: Learning) -> Learned:
         """Learn the drive; `usable` says which of its images have a place."""
@@ -127,6 +131,11 @@ def in_blocks(vectors_of: Callable[[NDArray[np.uint8]], Vectors], images: NDArra
 def scorer_of(part: Scorer | Descriptor) -> Scorer:
     """The part itself, or the scorer that a descriptor makes."""
     return Described(part) if isinstance(part, Descriptor) else part
+
+
+def require(part: Scorer | Descriptor) -> None:
+    """MissingExtraError where what a scorer learns with is not installed."""
+    getattr(part, "require", lambda: None)()
 
 
 def usable(reference: Traverse, places: Places) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -13,6 +13,7 @@ from typing import Any
 
 from evplace.core.errors import SettingsError
 from evplace.core.settings import make
+from evplace.scorers.network import Network
 from evplace.scorers.trained import FOLDER, DescriptorGraph
 from evplace_lab.descriptor.making import Recipe, judged, make_towns, train_seed
 from evplace_lab.reproduction import Choice, Table
@@ -32,6 +33,7 @@ def document(
     Settings of the choice's trainings are those of the recipe: towns, steps.
     """
     recipe = _recipe(choice)
+    Network().require()
     said = progress or (lambda *_: None)
     make_towns(out, recipe, workers, said)
     rows = []
