@@ -23,8 +23,8 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places scorers matchers placemap localizer serving evaluation doctor "
-        "testing cli"
+        "core sources imaging drives places scorers matchers placemap localizer exports serving "
+        "evaluation doctor testing cli"
     ),
     "evplace.core": "errors events grey zscores settings families storage workers drawing",
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",
@@ -36,7 +36,7 @@ ORDER = {
     "evplace.scorers": "_search _reduction _compressed _distances _seqslam_images _network",
     "evplace.scorers._network": "network_onnx network augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
-    "evplace_lab": "city descriptor reproduction report cli",
+    "evplace_lab": "city descriptor reproduction report demonstration cli",
 }
 """Package -> its parts in the order of the data: a part imports only parts before it, or files of its own."""
 
