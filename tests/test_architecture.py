@@ -26,7 +26,7 @@ ORDER = {
         "core sources imaging drives places scorers matchers placemap localizer exports serving "
         "evaluation doctor testing cli"
     ),
-    "evplace.core": "errors events grey zscores settings families storage workers drawing",
+    "evplace.core": "errors folders events grey zscores settings families storage workers drawing",
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",
     "evplace.imaging": (
         "windows _resampling representations tones images activity averaging recipe stream store spacing "

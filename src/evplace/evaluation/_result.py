@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core import storage
+from evplace.core import folders, storage
 from evplace.core.errors import EvaluationError, InputError
 from evplace.evaluation._measures import CURVE, Bools, Floats
 from evplace.evaluation._samples import Samples
 from evplace.matchers import Path as Answers
 
-MARK = "pr_curve.npy"
+MARK = folders.RESULT
 """What tells a folder that was written here from any other: only such a one is replaced."""
 _MATCHES = ("query", "t_us", "item", "score", "accepted", "judged", "seen", "right", "true_item")
 _NEEDED = ("queries", "left_out", "items", "judged", "accuracy", "accuracy_seen", "average_precision")
@@ -115,6 +115,8 @@ class Result:
     def load(cls, path: str | Path) -> Result:
         """The result in a folder; EvaluationError where it is none or damaged."""
         folder = Path(path)
+        if not (folder / MARK).exists() and (told := folders.instead(folder, MARK)) is not None:
+            raise EvaluationError(told)
         try:
             what = f"the result in {folder}"
             summary = storage.read_json(folder / "result.json", what)

@@ -9,6 +9,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from evplace.core import folders
 from evplace.core.errors import InputError, PlaceMapError
 from evplace.core.storage import read_array, read_bytes, read_json, sha256, write_array
 
@@ -16,7 +17,7 @@ FORMAT = "evplace-map-2"
 OLD_FORMAT = "evplace-map-1"
 """Its recipe and scorer lie in pieces in `settings`."""
 SUMS = "SHA256SUMS"
-MARK = "map.json"
+MARK = folders.MAP
 """What tells a folder that was written here from any other: only such a one is replaced."""
 TIMES = "times.npy"
 RESERVED = (MARK, "items.npy", "drive.npy", TIMES)

@@ -13,6 +13,7 @@ import utm
 from numpy.typing import NDArray
 
 from evplace.core.events import Events, Size
+from evplace.core.folders import DRIVE
 from evplace.core.storage import GrowingArray, new_folder, write_array
 from evplace.exports import nmea, of_track
 from evplace.imaging.images import Imager, frame_image
@@ -30,7 +31,7 @@ from evplace_lab.city.town import Town
 COLOUR = "colour"
 """Folder of the colour traverse, beside one for each sensor."""
 
-MARK = "poses.npy"
+MARK = DRIVE
 """What marks a folder that was written here: only such a one is replaced."""
 PACKET = 1 << 17
 """Events that are written at a time."""
