@@ -23,7 +23,7 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places scorers matchers placemap localizer exports serving "
+        "core sources imaging drives places torch scorers matchers placemap localizer exports serving "
         "evaluation doctor testing cli"
     ),
     "evplace.core": "errors folders events grey zscores settings families storage workers drawing",
@@ -128,6 +128,10 @@ def _flat_fields(kind: type[Any]) -> Iterator[str]:
 FAMILIES = {**families.MODULES, **families.CLASSES}.values()
 
 
+DOORS = ("evplace.torch",)
+"""Modules that users import by themselves."""
+
+
 def used_only_inside() -> list[str]:
     """Modules without an underscore that no other package of ours imports; parts of families have no user."""
     files = {
@@ -140,7 +144,13 @@ def used_only_inside() -> list[str]:
     for module in files:
         package = module.rpartition(".")[0]
         private = any(part.startswith("_") for part in module.split("."))
-        if private or package in FAMILIES or package.startswith("evplace_lab") or package.endswith(".cli"):
+        if (
+            private
+            or module in DOORS
+            or package in FAMILIES
+            or package.startswith("evplace_lab")
+            or package.endswith(".cli")
+        ):
             continue
         users = {user for user, names in named if any(f"{name}.".startswith(f"{module}.") for name in names)}
         if not any(not f"{user}.".startswith(f"{package}.") for user in users):

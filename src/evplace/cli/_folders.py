@@ -112,7 +112,7 @@ def _examination(path: Path) -> Facts:
     about = read_json(path / DOCTOR, f"the findings in {path}")
     states = [finding.get("state") for finding in about.get("findings", []) if isinstance(finding, dict)]
     counts = {state: states.count(state) for state in dict.fromkeys(states)}
-    return {"kind": "report of the doctor", "of": about.get("path"), "findings": counts}
+    return {"kind": "report of the doctor", "of": about.get("recording"), "findings": counts}
 
 
 def _film(path: Path) -> Facts:
