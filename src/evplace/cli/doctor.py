@@ -31,7 +31,7 @@ from evplace.core.errors import TrackError
 from evplace.doctor import STATES, Examination, Finding, as_json, check_drawing, draw, examine, examine_log
 from evplace.sources.film import is_video
 from evplace.sources.readers import is_recording
-from evplace.sources.tracks import format_of
+from evplace.sources.tracks import Track, open_track
 
 WIDTH = 110
 """Columns of the text."""
@@ -67,7 +67,8 @@ def run(args: Args) -> int:
     """Examine, print, and draw if asked."""
     if args.report is not None:
         check_drawing(args.report, args.overwrite)
-    found = examine_log(args.recording) if _is_log(args) else _examined(args)
+    log = _log(args)
+    found = _examined(args) if log is None else examine_log(args.recording, log)
     found = replace(found, findings=tuple(map(_with_flags, found.findings)))
     if args.report is not None:
         draw(found, args.report, args.overwrite)
@@ -82,16 +83,15 @@ def run(args: Args) -> int:
     return USED_GOOD_PART if found.fault is not None else 0
 
 
-def _is_log(args: Args) -> bool:
-    """Whether what is given is a log of positions, not a recording with one beside it."""
+def _log(args: Args) -> Track | None:
+    """The log of positions that is given by itself; None for anything else."""
     path = args.recording
     if args.track is not None or not path.is_file() or is_video(path) or is_recording(path):
-        return False
+        return None
     try:
-        format_of(path)
+        return open_track(path)
     except TrackError:
-        return False
-    return True
+        return None
 
 
 def _examined(args: Args) -> Examination:

@@ -59,9 +59,9 @@ def examine(
     return _examined(Subject(recording.path, "events", recording.size, windows, positions, recording))
 
 
-def examine_log(path: str | Path, track: Track | None = None) -> Examination:
-    """Examine a log of positions by itself; `track` is what it holds, where it is read already."""
-    positions = _known(open_track(path) if track is None else track)
+def examine_log(path: str | Path, track: Track) -> Examination:
+    """Examine a log of positions by itself; `track` is what it holds."""
+    positions = _known(track)
     assert positions is not None  # a track has fixes, or it would have said so
     facts = {
         "kind": "fixes", "fixes": len(positions), "t_first_us": int(positions.t_us[0]),
