@@ -41,7 +41,8 @@ Answers = Literal["live", "hindsight"]
 """What the camera would have been told as it drove; or what is known once the drive is over."""
 State = StateOfAnswer | Literal["no-events"]
 """What a match is worth: see `evplace.matchers.State`; no-events: the window was empty."""
-
+SURE = ("localised", "standing")
+"""The states of matches that the method stands by."""
 FOLLOWS_US = 33_333
 """How long after the last image of one clock the first of another is taken to be, in microseconds."""
 

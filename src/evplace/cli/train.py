@@ -41,7 +41,7 @@ from evplace.imaging.windows import WindowSettings
 from evplace.matchers.local import Local
 from evplace.placemap import MARK, PlaceMap, add, default_scorer, named, names_of, train
 from evplace.places import PlaceGrid, PlaceRuns, Places
-from evplace.scorers import Descriptor, Learning, Scorer
+from evplace.scorers import Descriptor, Learning, Scorer, require
 from evplace.scorers.network import TrainSettings
 from evplace.sources.cleaning import CleaningSettings
 
@@ -100,6 +100,7 @@ def run(args: Args) -> int:
     if len(args.sources) > 1:
         _check_several(args)
     scorer = _scorer(args)
+    require(scorer)
     drives = [_opened(args, source) for source in args.sources]
     reference = drives[0]
     places = _places(args, reference)

@@ -228,7 +228,8 @@ from evplace.matchers._rows import Answers, RowCheck  # noqa: E402 - they are ma
 
 __all__ = [
     "Answer", "Answers", "Estimate", "Following", "Judge", "Learned", "LearnsMore", "Matcher", "Matching",
-    "Path", "Route", "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep", "open_matcher", "stepped",
+    "Path", "Route", "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep", "open_matcher",
+    "stepped",
 ]  # fmt: skip
 
 

@@ -70,7 +70,11 @@ class ComparesSome(Protocol):
 
 
 class Scorer(Protocol):
-    """A way to compare, with its settings. A class may have `presets`: names and objects of it."""
+    """A way to compare, with its settings. A class may have `presets`: names and objects of it.
+
+    One that learns by a package that may be missing has `require()`, which raises MissingExtraError then: it
+    is asked before the work.
+    """
 
     def learn(self, reference: Traverse, places: Places, learning: Learning) -> Learned:
         """Learn the drive; `usable` says which of its images have a place."""
@@ -172,6 +176,11 @@ def opened_together(part: Scorer | Descriptor, contents: Sequence[Content]) -> l
         shared = {name: Remembering(one) for name, one in part.parts.items()}
         return [part.open(content, shared) for content in contents]
     return [scorer_of(part).open(content) for content in contents]
+
+
+def require(part: Scorer | Descriptor) -> None:
+    """MissingExtraError where what a scorer learns with is not installed."""
+    getattr(part, "require", lambda: None)()
 
 
 def usable(reference: Traverse, places: Places) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

@@ -16,6 +16,7 @@ from typing import Any
 from evplace.core.errors import SettingsError
 from evplace.core.settings import make
 from evplace.core.workers import Workers
+from evplace.scorers.network import Network
 from evplace.scorers.trained import FOLDER, DescriptorGraph
 from evplace_lab.descriptor.making import Recipe, judged, make_towns, train_seed
 from evplace_lab.reproduction import Choice, Table
@@ -35,6 +36,7 @@ def document(
     Settings of the choice's trainings are those of the recipe: towns, steps.
     """
     recipe, began = _recipe(choice), time.process_time()
+    Network().require()
     said = progress or (lambda *_: None)
     make_towns(out, recipe, workers, said)
     rows = []
