@@ -23,6 +23,9 @@ HZ, FIXES = 5, 16
 """Fixes a second, and in all."""
 FENCE = re.compile(r"^```(\w+)(?: title=\"([^\"]*)\")?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
+INCLUDED = re.compile(r"^--8<-- \"(.*)\"$", re.MULTILINE)
+"""Where a page shows a file of the repository."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -41,7 +44,8 @@ class Block:
 
 def blocks(page: Path) -> list[Block]:
     """All blocks of a page, in its order."""
-    return [Block(*found.groups(default="")) for found in FENCE.finditer(page.read_text("utf-8"))]
+    text = INCLUDED.sub(lambda found: (ROOT / found[1]).read_text("utf-8").strip(), page.read_text("utf-8"))
+    return [Block(*found.groups(default="")) for found in FENCE.finditer(text)]
 
 
 def pages() -> list[Path]:
@@ -50,14 +54,34 @@ def pages() -> list[Path]:
 
 
 def write_drives(folder: Path) -> None:
-    """day.aedat4, night.aedat4, their logs, and a drive of a data set: the files that the pages name."""
+    """The files that the pages name: drives and their logs, a drive of a data set, and files with faults."""
+    write_pair(folder, ".aedat4")
+    (folder / "two_hours_off.nmea").write_text(rmc_log(log_of(START_S + 7200)))
+    (folder / "cut.aedat4").write_bytes((folder / "day.aedat4").read_bytes()[:300_000])
+    (folder / "table.txt").write_text("1 2 3 1\n5 4 4 0\n")
+    (folder / "letter.txt").write_text("Dear reader,\n")
+    write_brisbane(folder / "brisbane")
+
+
+def write_sample(folder: Path) -> None:
+    """The files of `evplace sample`, of a made street."""
+    folder.mkdir()
+    write_pair(folder, ".h5")
+
+
+def write_pair(folder: Path, suffix: str) -> None:
+    """A street by day and by night, and the logs."""
     for name, seed, noise in (("day", 0, 0.002), ("night", 1, 0.02)):
         made = make_drive(seed, windows=80, noise=noise).events
         events = Events.of(made.t_us + START_S * 1_000_000, made.x, made.y, made.p, made.size)
-        write_recording(folder / f"{name}.aedat4", [events], events.size)
-        log = Log(seconds=FIXES)
-        log.t_s = START_S + np.arange(FIXES) / HZ
-        log.mps[:] = MPS
-        log.latitude = LATITUDE + MPS / HZ * np.arange(FIXES) * DEGREES
-        (folder / f"{name}.nmea").write_text(rmc_log(log))
-    write_brisbane(folder / "brisbane")
+        write_recording(folder / f"{name}{suffix}", [events], events.size)
+        (folder / f"{name}.nmea").write_text(rmc_log(log_of(START_S)))
+
+
+def log_of(start_s: int) -> Log:
+    """Where the camera was."""
+    log = Log(seconds=FIXES)
+    log.t_s = start_s + np.arange(FIXES) / HZ
+    log.mps[:] = MPS
+    log.latitude = LATITUDE + MPS / HZ * np.arange(FIXES) * DEGREES
+    return log

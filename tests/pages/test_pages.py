@@ -6,10 +6,11 @@ import importlib
 import os
 import re
 import shutil
+import sys
 import tomllib
+import types
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -60,7 +61,8 @@ def test_what_a_page_says_to_type(
 ) -> None:
     shutil.copytree(made, tmp_path / "here")
     monkeypatch.chdir(tmp_path / "here")
-    names: dict[str, Any] = {}
+    module = types.ModuleType("typed_on_a_page")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
     said = ""
     capsys.readouterr()
     for block in blocks(page):
@@ -69,9 +71,9 @@ def test_what_a_page_says_to_type(
         elif block.language == "python":
             for output in re.findall(r"\.save\(\"(.*)\"\)", block.text):
                 remove(Path(output))
-            code = compile(block.text, name_of(page), "exec")
+            code = compile(block.text, name_of(page), "exec", dont_inherit=True)
             if block.title != GOES_ON:
-                exec(code, names)
+                exec(code, vars(module))
             said = capsys.readouterr().out
         elif block.language == "text":
             check_said(block, said)
@@ -85,9 +87,11 @@ def typed(words: list[str], block: Block, capsys: Capture) -> str:
     """What a command says."""
     program = words[0] if not words[0].startswith(("scripts/", "examples/")) else "scripts"
     assert program in PROGRAMS, f"nobody knows how to try `{' '.join(words)}`"
+    expected = int(block.title.removeprefix("exit code ")) if block.title.startswith("exit code") else 0
+    if expected == 0 and "-o" in words:
+        remove(Path(words[words.index("-o") + 1]))
     code = PROGRAMS[program](words)
     said = "".join(capsys.readouterr())
-    expected = int(block.title.removeprefix("exit code ")) if block.title.startswith("exit code") else 0
     assert code == expected, f"`{' '.join(words)}` ended with {code}: {said}"
     return said
 
@@ -98,8 +102,6 @@ def evplace(words: list[str]) -> int:
     if any(line.startswith(begin) for begin in ONLY_READ):
         parse(importlib.import_module(_modules()[words[1]]), words[1], words[2:])
         return 0
-    if "-o" in words and "--overwrite" not in words:
-        remove(Path(words[words.index("-o") + 1]))
     return main(words[1:])
 
 
