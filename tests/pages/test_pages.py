@@ -1,4 +1,4 @@
-"""All that the pages say to type is typed, on made drives; what takes a city, a camera or an hour is only read."""
+"""What the pages say to type is typed, on made drives; what takes a city, a camera or an hour is read."""
 
 from __future__ import annotations
 
