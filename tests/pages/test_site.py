@@ -1,4 +1,4 @@
-"""The pages hang together: links lead somewhere, all pages are reached, all parts are named, figures agree."""
+"""The pages hang together: links lead somewhere, every page is reached, every part named, figures agree."""
 
 from __future__ import annotations
 
