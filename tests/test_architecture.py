@@ -23,7 +23,7 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places searchers scorers matchers placemap localizer serving evaluation "
+        "core sources imaging drives places searchers scorers matchers placemap _regions localizer serving evaluation "
         "doctor testing cli"
     ),
     "evplace.core": "errors events grey zscores settings families storage workers drawing",

@@ -5,6 +5,8 @@ Examples:
   evplace localize campus.evp night.aedat4 -o night.csv
   evplace localize campus.evp night --matcher seqslam --set ds=20
   evplace localize campus.evp night.aedat4 --mask night_hot_pixels.txt
+  evplace localize campus.evp night.aedat4 --near-m 200 --track night.nmea    a GPS that is good to 200 m
+  evplace localize campus.evp night.aedat4 --near-m 200          near the last match, where there is one
   evplace localize campus.evp night.aedat4 --json              a JSON object a line
   evplace localize campus.evp night.aedat4 --watch             at the camera's pace, as `evplace serve` does
   evplace localize campus.evp udp:3333 --watch                 any source of `evplace list live`
@@ -20,13 +22,15 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import tyro
 
 from evplace.cli._matcher import MatcherFlags, note_matches
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.cli._recording import DriveFlags
+from evplace.cli._settings import Part
+from evplace.cli._track import TrackFlags
 from evplace.core.errors import DamagedRecordingError, SettingsError
 from evplace.core.storage import new_file
 from evplace.drives._recorded import packets_onto
@@ -43,13 +47,15 @@ from evplace.sources.simulators.recording import SimulatedRecording
 
 COLUMNS = (
     "t_us", "place", "easting", "northing", "score", "state", "latitude", "longitude", "heading_deg",
-    "probability", "uncertainty_m",
+    "probability", "uncertainty_m", "compared",
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
-class Args(MatcherFlags, DriveFlags):
+class Args(MatcherFlags, TrackFlags, DriveFlags):
     """Flags of `evplace localize`."""
+
+    PARTS: ClassVar[tuple[Part, ...]] = (*TrackFlags.PARTS, *MatcherFlags.PARTS)
 
     map: tyro.conf.Positional[Path]
     """A map that `evplace train` wrote."""
@@ -59,6 +65,9 @@ class Args(MatcherFlags, DriveFlags):
     """Write a .csv file instead of standard output."""
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
+    near_m: float | None = None
+    """Compare only with references within so many metres of where --track says that the drive is, or without
+    one, of the last match; with all of them where neither is known."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -115,8 +124,9 @@ class _Drive:
 def run(args: Args) -> int:
     """Localise and print, or write, the matches."""
     where = Localizer(
-        PlaceMap.load(args.map), args.matcher, args.preset, args.mask, **args.matcher_settings()
-    )
+        PlaceMap.load(args.map), args.matcher, args.preset, args.mask, args.near_m, args.opened_track(),
+        **args.matcher_settings(),
+    )  # fmt: skip
     if args.watch:
         return _watched(where, args)
     matches = _Drive(where, args)
@@ -162,7 +172,7 @@ def _row(match: Match, place_map: PlaceMap) -> list[object]:
     return [
         match.t_us, match.place, _shown(easting, ".2f"), _shown(northing, ".2f"), _shown(match.score, ".6g"),
         match.state, _shown(latitude, ".7f"), _shown(longitude, ".7f"), _shown(heading, ".1f"),
-        _shown(match.probability, ".4f"), _shown(match.uncertainty_m, ".1f"),
+        _shown(match.probability, ".4f"), _shown(match.uncertainty_m, ".1f"), match.compared,
     ]  # fmt: skip
 
 
