@@ -86,8 +86,11 @@ class Streets:
         return self._mixed(a, b, mirror, share)
 
     def _mixed(self, one: Vectors, other: Vectors, mirror: Vectors, share: float) -> Vectors:
-        """What all images have in common is neither blended nor mirrored."""
-        apart = np.cos(share) * (one - self._mean) + np.sin(share) * (other - self._mean)
+        """What all images have in common is neither blended nor mirrored; a blend is as long as its parts."""
+        parts = np.cos(share) * (one - self._mean), np.sin(share) * (other - self._mean)
+        apart = parts[0] + parts[1]
+        long = np.sqrt(sum(np.square(part).sum(-1, keepdims=True) for part in parts))
+        apart *= long / np.linalg.norm(apart, axis=-1, keepdims=True)
         return np.asarray(self._mean + apart * mirror, np.float32)
 
     def _blend(self, street: int) -> tuple[int, int, Vectors, float]:

@@ -23,8 +23,8 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places torch searchers scorers matchers placemap localizer exports "
-        "serving evaluation doctor testing cli"
+        "core sources imaging drives places torch searchers scorers matchers placemap _regions localizer "
+        "exports serving evaluation doctor testing cli"
     ),
     "evplace.core": "errors folders events grey zscores settings families storage workers cluster drawing",
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",

@@ -16,8 +16,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace._regions import Compared, Regions, Rough
 from evplace.core import families
-from evplace.core.errors import PartError, PlaceMapError, RecordingError
+from evplace.core.errors import PartError, PlaceMapError, RecordingError, SettingsError
 from evplace.core.events import Events, Size
 from evplace.core.settings import make, to_dict
 from evplace.core.tables import empty_rows, rows_of
@@ -26,14 +27,15 @@ from evplace.imaging.averaging import Averager
 from evplace.imaging.recipe import shown
 from evplace.imaging.stream import EventImage, EventImages
 from evplace.imaging.traverse import Traverse
-from evplace.matchers import Answer, Estimate, Following, Matcher, Path, RouteMatcher, Seen
+from evplace.matchers import Answer, Estimate, Matcher, Path, RouteMatcher, Seen
 from evplace.matchers import State as StateOfAnswer
 from evplace.matchers._checks import check_answer, check_path
-from evplace.matchers._drives import follow
+from evplace.matchers._parts import InParts
 from evplace.placemap import PlaceMap, default_matcher
-from evplace.scorers import OpenScorer, Rows
+from evplace.scorers import ComparesSome, OpenScorer, Rows
 from evplace.sources.cleaning import MaskSource, read_mask
 from evplace.sources.readers import Canvas
+from evplace.sources.tracks import Track
 
 BLOCK = 64
 """Images scored at once in hindsight."""
@@ -72,6 +74,8 @@ class Match:
     """Where the item looks, clockwise from north; None where unknown."""
     others: tuple[int, ...] = ()
     """The next best items, at other places, best first, where the matcher says them."""
+    compared: Compared = "all"
+    """What its image was compared with: all of the map, or what is near a position or the last match."""
 
 
 class Answered(NamedTuple):
@@ -94,6 +98,8 @@ class Localizer:
         matcher: str | Matcher | None = None,
         preset: str | None = None,
         mask: MaskSource | None = None,
+        near_m: float | None = None,
+        track: Track | Rough | None = None,
         **settings: object,
     ) -> None:
         """For one map, with its own matcher, or another by name, preset and settings, or an object.
@@ -101,8 +107,13 @@ class Localizer:
         `Localizer(campus, matchers.Local(K=5))` and `Localizer(campus, "local", K=5)` are the same; settings
         without a name are those of the map's own matcher. Events are cleaned as those of the map were. Which
         pixels are hot belongs to the drive, so a map that was learned without hot pixels needs the drive's
-        own `mask` (see `evplace.sources.cleaning.read_mask`, and `pixel_mask` to measure it). Raises
-        SettingsError for an unknown matcher, preset or setting.
+        own `mask` (see `evplace.sources.cleaning.read_mask`, and `pixel_mask` to measure it).
+
+        With `near_m`, images are compared with the references within so many metres of a rough position
+        alone: that of `track`, the drive's own or a function of a time that gives east and north in the
+        map's metres or None; without one, that of the last match. Where there is none all are compared;
+        `Match.compared` says which. Raises SettingsError for an unknown matcher, preset or setting,
+        PlaceMapError for `near_m` with a map without positions.
         """
         self.map = place_map
         self.matcher: Matcher = _matcher(place_map, matcher, preset, settings)
@@ -113,6 +124,7 @@ class Localizer:
         with families.blaming("scorers", place_map.scorer):
             self._distances = bool(self.scorer.distances)
         self._route = place_map.route(learned=type(self.matcher) is type(place_map.matcher))
+        self._near = near_m, track
         self.reset()
 
     @property
@@ -124,14 +136,15 @@ class Localizer:
     def reset(self) -> None:
         """Forget the drive so far."""
         with families.blaming("matchers", self.matcher):
-            self._following: Following = follow(self.matcher, self._route, self._distances)
+            self._following = InParts(self.matcher, self._route, self._distances)
+        self._regions = Regions(self.map, *self._near)
         self._stepped = 0
         self.image: NDArray[np.uint8] | None = None
         """The last image that was matched."""
         self._images: EventImages | None = None
         self._seeing = _Seeing(self.map)
         self._clock = _Clock()
-        self._times_us: dict[int, int] = {}
+        self._times_us: dict[int, tuple[int, Compared]] = {}
 
     def push(self, events: Events) -> Iterator[Match]:
         """The matches of all windows that `events` bring to their end."""
@@ -179,9 +192,16 @@ class Localizer:
     def push_image(self, image: NDArray[np.uint8], t_us: int) -> Iterator[Match]:
         """The matches that become known with one more image (h, w) or (h, w, C)."""
         self.image = image
-        self._times_us[self._stepped] = t_us
         mean, seen = self._seeing.see(image, self._clock.passed(t_us))
-        yield from self._matches(self._step(self.rows(mean[None])[0], seen))
+        region = self._regions.at(t_us)
+        if region.items is not None and not len(region.items):
+            yield Match(t_us, -1, -1, None, np.nan, "unseen", compared=region.compared)
+            return
+        self._times_us[self._stepped] = t_us, region.compared
+        row = self.rows(mean[None])[0] if region.items is None else self.row_of(mean, region.items)
+        with families.blaming("matchers", self.matcher):
+            self._following.within(region.items)
+        yield from self._matches(self._step(row, seen))
 
     def match_traverse(self, traverse: Traverse) -> Iterator[Match]:
         """The matches of a traverse's images, as `push` would give them for its events.
@@ -211,6 +231,17 @@ class Localizer:
         check_rows(rows, len(images), self.map)
         return rows
 
+    def row_of(self, image: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        """(len(items),) the scores of some items alone, for an image that may be compared."""
+        if isinstance(self.scorer, ComparesSome):
+            with families.blaming("scorers", self.map.scorer):
+                rows: Rows = self.scorer.some(image[None], items)
+        else:
+            rows = self.rows(image[None])[:, items]
+        check_rows(rows, 1, self.map, len(items))
+        row: Rows = rows[0]
+        return row
+
     def answers(self, query: Traverse, answers: Answers = "live", rows: Rows | None = None) -> Answered:
         """One answer for each image of a whole traverse; this localizer forgets what it had seen before.
 
@@ -218,7 +249,7 @@ class Localizer:
         ahead, from as many after it as it waits for. "hindsight": the matcher's `path`, from all images.
         Images without events are answered with -1, and their rows are zero. `rows` are what another localizer
         of this map gave for this traverse in the same way, so that they need not be scored again.
-        PlaceMapError where the query's images were not made as the map's.
+        PlaceMapError where the query's images were not made as the map's, SettingsError with `near_m`.
         """
         answering = Answering(self, query, answers, rows, keep=True)
         for _ in answering:
@@ -265,16 +296,19 @@ class Localizer:
 
     def _matches(self, answers: list[Answer]) -> Iterator[Match]:
         for answer in answers:
-            t_us = self._times_us[answer.query]
+            t_us, compared = self._times_us[answer.query]
             for query in [query for query in self._times_us if query <= answer.query]:
                 del self._times_us[query]
-            yield self._match(t_us, answer)
+            match = self._match(t_us, answer, compared)
+            if answer.accepted and match.position is not None:
+                self._regions.found(t_us, match.position)
+            yield match
 
-    def _match(self, t_us: int, answer: Answer) -> Match:
+    def _match(self, t_us: int, answer: Answer, compared: Compared) -> Match:
         """An answer of the matcher, with what the map knows of its item."""
         state: StateOfAnswer = "localised" if answer.accepted else "unseen"
         if answer.item < 0:
-            return Match(t_us, -1, -1, None, answer.score, "unseen")
+            return Match(t_us, -1, -1, None, answer.score, "unseen", compared=compared)
         items, more = self.map.items, answer.estimate or Estimate(state, math.nan, math.nan, ())
         easting, northing = items.position[answer.item]
         heading = float(items.heading_deg[answer.item])
@@ -282,7 +316,7 @@ class Localizer:
             t_us, answer.item, int(items.place[answer.item]),
             None if np.isnan(easting) else (float(easting), float(northing)),
             answer.score, more.state, more.probability, more.uncertainty_m,
-            None if np.isnan(heading) else heading, more.others,
+            None if np.isnan(heading) else heading, more.others, compared,
         )  # fmt: skip
 
     def _open_images(self, size: Size) -> EventImages:
@@ -315,6 +349,8 @@ class Answering:
         keep: bool = False,
     ) -> None:
         """`rows` are given, as in `Localizer.answers`; or they are made, and where `keep` says so, kept."""
+        if localizer._near[0] is not None:
+            raise SettingsError("answers to a whole traverse compare all references: leave out `near_m`")
         localizer.map.require_same(query)
         localizer.reset()
         self._of, self._query, self._given = localizer, query, rows
@@ -457,9 +493,9 @@ def _matcher(
     return made
 
 
-def check_rows(rows: object, images: int, place_map: PlaceMap) -> None:
-    """PartError where a scorer gives anything but finite (images, items) scores."""
-    wanted = (images, len(place_map.items))
+def check_rows(rows: object, images: int, place_map: PlaceMap, items: int | None = None) -> None:
+    """PartError where a scorer gives anything but finite (images, items) scores; of all items or some."""
+    wanted = (images, len(place_map.items) if items is None else items)
     kind, unfinite = type(rows).__name__, ""
     if isinstance(rows, np.ndarray):
         kind = f"{rows.dtype} {rows.shape}"

@@ -44,7 +44,7 @@ class MatcherFlags(SettingsFlags):
     set: Pairs = ()
     """A setting of the matcher, as name=value: K=5, tau1=0.99, tau2=0.01 for local."""
 
-    def matcher_settings(self) -> dict[str, object]:
+    def matcher_settings(self) -> dict[str, Any]:
         """The settings that flags give, those with flags of their own among them."""
         own = {"false_accept": self.false_accept, "lag_s": self.lag_s}
         return dict(self.set) | {name: value for name, value in own.items() if value is not None}

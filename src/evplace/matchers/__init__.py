@@ -164,6 +164,17 @@ class Following(Protocol):
 
 
 @runtime_checkable
+class Continuing(Following, Protocol):
+    """A Following that goes on where the drive comes to another part of the map."""
+
+    def continued(self, route: Route, came_from: NDArray[np.int64]) -> Following:
+        """On other items of the same map; `came_from` (items,) is the number of each so far, -1 of a new one.
+
+        Queries go on being numbered.
+        """
+
+
+@runtime_checkable
 class RouteMatcher(Protocol):
     """A Matcher that also uses where a map's items are, and when and how much a query saw."""
 
@@ -227,9 +238,9 @@ def open_matcher(
 from evplace.matchers._rows import Answers, RowCheck  # noqa: E402 - they are made of what stands above
 
 __all__ = [
-    "Answer", "Answers", "Estimate", "Following", "Judge", "Learned", "LearnsMore", "Matcher", "Matching",
-    "Path", "Route", "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep", "open_matcher",
-    "stepped",
+    "Answer", "Answers", "Continuing", "Estimate", "Following", "Judge", "Learned", "LearnsMore", "Matcher",
+    "Matching", "Path", "Route", "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep",
+    "open_matcher", "stepped",
 ]  # fmt: skip
 
 
