@@ -148,6 +148,7 @@ def _say(args: Args, path: Path, place_map: PlaceMap) -> None:
             "source": part.map.info.get("source"),
             "references": len(part.item),
             "items": len(np.unique(part.item)),
+            "left_out": part.map.info.get("left_out", {}),
         }
         for part in parts
     ]
@@ -157,7 +158,12 @@ def _say(args: Args, path: Path, place_map: PlaceMap) -> None:
     for drive in drives:
         facts[f"drive {drive['name']}"] = (
             f"{drive['references']} references at {drive['items']} items, of {drive['source']}"
+            f"{_left_out(drive['left_out'])}"
         )
     for version in versions:
         facts[f"version {version['version']}"] = f"{version['change']} ({version['at'] or 'time not known'})"
     print_facts(str(path), facts)
+
+
+def _left_out(reasons: dict[str, int]) -> str:
+    return "".join(f"; {many} left out: {reason}" for reason, many in reasons.items())

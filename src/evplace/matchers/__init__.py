@@ -148,9 +148,9 @@ class Route(NamedTuple):
     """What the map's images usually show, as in Seen."""
     learned: Learned | None = None
     """What `learn` has given for this map; None where it was not asked."""
-    own: NDArray[np.int64] | None = None
-    """(images,) the item of each of the images that `learn` may ask rows of; None where these are the items'
-    own, one each, and a row also says how like itself an image is."""
+    own: Sequence[NDArray[np.int64]] | None = None
+    """The item of each of the images that `learn` may ask rows of, for each drive of the map, one behind the
+    other; None where these are the items' own, one each, and a row also says how like itself an image is."""
 
 
 class Following(Protocol):

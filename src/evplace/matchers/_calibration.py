@@ -89,13 +89,14 @@ def strangers(route: Route, rows: Callable[[slice], Rows]) -> Strangers | None:
     items = len(ways.way)
     if items < LEAST_ITEMS or ways.way[-1] < SHORTEST_M:
         return None
-    at = np.arange(items) if route.own is None else route.own
-    at = at[:MOST_IMAGES]
+    drives = [np.arange(min(items, MOST_IMAGES))] if route.own is None else route.own
+    at = np.concatenate(drives)
     own = np.array(rows(slice(0, len(at))), np.float32)
     if route.own is None:
         own[at, at] = own.min(axis=1)  # an image tells nothing of itself
     learned = {WRONG: _wrong(ways, own, at), CONTENT: np.array([route.content])}
-    unknown = [_trial(route, ways, own, at, learned, keep) for keep in _cuts(ways)]
+    each = list(zip(drives, np.split(own, np.cumsum([len(drive) for drive in drives])[:-1]), strict=True))
+    unknown = [_trial(route, ways, *one, learned, keep) for keep in _cuts(ways) for one in each]
     live, late = (np.concatenate(column) for column in zip(*unknown, strict=True))
     return None if len(live) < LEAST_UNKNOWN else Strangers(learned, live, late)
 
@@ -123,9 +124,9 @@ def _cuts(ways: Ways) -> Iterator[Bools]:
 
 
 def _trial(
-    route: Route, whole: Ways, own: Rows, at: Ints, learned: Learned, keep: Bools
+    route: Route, whole: Ways, at: Ints, own: Rows, learned: Learned, keep: Bools
 ) -> tuple[Floats, Floats]:
-    """(unknown, features) live and late, of those of a map's images whose places are cut out."""
+    """(unknown, features) live and late, of those of a drive's images whose places are cut out."""
     part = Ways.of(_part(route, keep))
     seen, rows = _driven(whole, at), own[:, keep]
     unknown = np.array([not _near(whole, keep, item) for item in at])

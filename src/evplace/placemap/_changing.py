@@ -20,6 +20,7 @@ from evplace.core.errors import PlaceMapError, SettingsError, TraverseError
 from evplace.imaging.traverse import Traverse
 from evplace.placemap import Items, PlaceMap
 from evplace.placemap._parts import Part, places_in
+from evplace.placemap._thinning import thin
 from evplace.placemap._training import calibrate, calibrate_more, learned_map
 from evplace.places import PlaceGrid, PlaceRuns, Places
 from evplace.scorers import Learning
@@ -81,7 +82,7 @@ def split(place_map: PlaceMap, drives: Sequence[str]) -> PlaceMap:
         return first.map if first.map.learned else calibrate(first.map, place_map.matcher)
     found = named(first.map, first.name)
     for part in others:
-        found = _joined(found, part)
+        found = _joined(found, part, thinning=False)
     found = _noted(found, found, f"split off {', '.join(part.name for part in found.parts)}")
     return calibrate(found, place_map.matcher)
 
@@ -143,11 +144,15 @@ def safe_name(text: str) -> str:
     return re.sub(r"[^a-z0-9_-]+", "-", text.lower()).strip("-")[:60]
 
 
-def _joined(place_map: PlaceMap, part: Part) -> PlaceMap:
-    """The map with one more part, whose items are found here; it is not measured."""
+def _joined(place_map: PlaceMap, part: Part, thinning: bool = True) -> PlaceMap:
+    """The map with one more part, whose items are found here; it is not measured.
+
+    `thinning` says that references which add nothing are left out.
+    """
     parts, more = parts_of(place_map), part.map
     _check_new(parts, part)
     item, fresh = places_in(place_map.items, more.items)
+    new = thin(parts, part._replace(item=item)) if thinning else part._replace(item=item)
     places = _all_places(place_map.places, more.places)
     return dataclasses.replace(
         place_map,
@@ -157,7 +162,7 @@ def _joined(place_map: PlaceMap, part: Part) -> PlaceMap:
         content={},
         info={},
         learned=None,
-        parts=(*parts, part._replace(item=item)),
+        parts=(*parts, new),
         sums=None,
     )
 

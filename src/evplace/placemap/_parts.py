@@ -54,6 +54,8 @@ class JoinedRows:
         item = np.concatenate(items)
         self._order = np.argsort(item, kind="stable")
         self._first = np.flatnonzero(np.diff(item[self._order], prepend=-1))
+        self.items = item[self._order][self._first]
+        """Those that have references, in ascending order: what the columns of a row are."""
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         """See OpenScorer."""

@@ -126,14 +126,13 @@ class OwnRows:
         parts = place_map.parts
         self._first = np.cumsum([0, *(len(part.item) for part in parts)])
         chosen = drives or range(len(parts))
-        self._images = [
-            (drive, at) for drive in chosen for at in range(min(len(parts[drive].item), most // len(chosen)))
-        ]
+        self._many = {drive: min(len(parts[drive].item), most // len(chosen)) for drive in chosen}
+        self._images = [(drive, at) for drive, many in self._many.items() for at in range(many)]
 
     def route(self, content: float) -> Route:
         """What a matcher learns from, besides the rows; `content` is what the images usually show."""
         parts = self._map.parts
-        own = np.array([parts[drive].item[at] for drive, at in self._images], np.int64) if parts else None
+        own = [parts[drive].item[:many] for drive, many in self._many.items()] if parts else None
         return self._map.route()._replace(content=content, own=own)
 
     def rows(self, images: slice) -> Rows:

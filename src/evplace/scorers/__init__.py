@@ -103,6 +103,14 @@ class OfParts(Protocol):
         """See Scorer; with other objects for `parts`."""
 
 
+@runtime_checkable
+class Thins(Protocol):
+    """A Scorer that can do without some references."""
+
+    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content:
+        """What is left of a content that was learned, with these of its items."""
+
+
 class Remembering:
     """A descriptor that does not describe the last images anew."""
 
@@ -181,6 +189,13 @@ def opened_together(part: Scorer | Descriptor, contents: Sequence[Content]) -> l
 def require(part: Scorer | Descriptor) -> None:
     """MissingExtraError where what a scorer learns with is not installed."""
     getattr(part, "require", lambda: None)()
+
+
+def thinned(part: Scorer | Descriptor, content: Content, items: NDArray[np.int64]) -> Content | None:
+    """What is left of a content with these of its items; None where the part cannot do without the others."""
+    if isinstance(part, Thins):
+        return part.thinned(content, items)
+    return {REFERENCES: references_of(content)[items]} if set(content) == {REFERENCES} else None
 
 
 def usable(reference: Traverse, places: Places) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

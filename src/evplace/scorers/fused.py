@@ -99,6 +99,14 @@ class Fused:
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
 
+    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content:
+        """See Thins."""
+        of_items = {REFERENCES, *(f"{name}_vectors" for name in self.parts)}
+        return {
+            name: value[items] if name in of_items and isinstance(value, np.ndarray) else value
+            for name, value in content.items()
+        }
+
     def open(self, content: Content, parts: Mapping[str, Descriptor] | None = None) -> OpenScorer:
         """See OfParts."""
         items = len(references_of(content))
