@@ -1,12 +1,12 @@
 """Memory of drives through maps that no memory holds: python bench/bench_large.py [--queries 2000 6000]
 
-100,000 references. Paths: what `path` needs beyond 256 MiB a table lies in a file: the peak does not grow with
-the queries; the file does, by 6 bytes a cell: 60 GB for 100,000 queries.
+100,000 references. Paths: what `path` needs beyond 256 MiB a table lies in a file: the peak does not grow
+with the queries; the file does, by 6 bytes a cell: 60 GB for 100,000 queries.
 
     python bench/bench_large.py --evaluate best bayes --queries 100000 --seconds 300
 
-`evaluate` keeps no rows. With --seconds it stops after so many, as if it were killed, and goes on where it was
-when it is called again (exit code 4 until it is done).
+`evaluate` keeps no rows. With --seconds it stops after so many, as if it were killed, and goes on where it
+was when it is called again (exit code 4 until it is done).
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def through(name: str, queries: int) -> None:
 
 
 def drives(queries: int) -> tuple[Traverse, Traverse]:
-    """A road of 100 km with an image a metre, and its first `queries` images with noise, half a metre aside."""
+    """A road of 100 km with an image a metre, and its first `queries` images again, with noise."""
     rng = np.random.default_rng(0)
     images = rng.integers(0, 256, (ITEMS, 8, 8), dtype=np.uint8)
     t_us = np.arange(ITEMS, dtype=np.int64) * 100_000
