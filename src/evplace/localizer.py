@@ -31,7 +31,7 @@ from evplace.matchers import State as StateOfAnswer
 from evplace.matchers._checks import check_answer, check_path
 from evplace.matchers._drives import follow
 from evplace.placemap import PlaceMap, default_matcher
-from evplace.scorers import OpenScorer, Rows, scorer_of
+from evplace.scorers import OpenScorer, Rows
 from evplace.sources.cleaning import MaskSource, read_mask
 from evplace.sources.readers import Canvas
 
@@ -41,7 +41,8 @@ Answers = Literal["live", "hindsight"]
 """What the camera would have been told as it drove; or what is known once the drive is over."""
 State = StateOfAnswer | Literal["no-events"]
 """What a match is worth: see `evplace.matchers.State`; no-events: the window was empty."""
-
+SURE = ("localised", "standing")
+"""The states of matches that the method stands by."""
 FOLLOWS_US = 33_333
 """How long after the last image of one clock the first of another is taken to be, in microseconds."""
 
@@ -108,8 +109,8 @@ class Localizer:
         """The matcher with its settings; `reset` begins with it anew."""
         self.mask = mask
         """Pixels of the drive to leave out; it counts from the first packet of a drive."""
+        self.scorer: OpenScorer = place_map.scoring()
         with families.blaming("scorers", place_map.scorer):
-            self.scorer: OpenScorer = scorer_of(place_map.scorer).open(place_map.content)
             self._distances = bool(self.scorer.distances)
         self._route = place_map.route(learned=type(self.matcher) is type(place_map.matcher))
         self.reset()

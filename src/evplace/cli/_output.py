@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import os
 import re
 import sys
 import warnings
@@ -95,6 +96,14 @@ def note_guesses(notes: object) -> None:
     """What was guessed of a recording, a remark each; `notes` are its own or those that a traverse kept."""
     for guess in notes if isinstance(notes, list) else []:
         note(str(guess))
+
+
+def show_page(address: str) -> None:
+    """Open a page or picture in a browser, where that is a window: in a terminal it would take that over."""
+    if sys.platform in ("win32", "darwin") or {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+        import webbrowser
+
+        webbrowser.open(address)
 
 
 @contextlib.contextmanager

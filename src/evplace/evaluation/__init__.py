@@ -36,6 +36,7 @@ from evplace.evaluation._measures import (
 )
 from evplace.evaluation._result import MARK, OUTCOMES, Result
 from evplace.evaluation._samples import ItemImages, Samples, choose, pictures
+from evplace.evaluation._similarity import similarities
 from evplace.evaluation.truth import Truth
 from evplace.matchers import Path as Answers
 
@@ -107,6 +108,7 @@ def measure(
     return Result(
         figures, resolved, versions(), answers, times, judged, seen, right, curve, scores,
         true_item=true_item, query_xy=here, item_xy=there,
+        similarity=None if scores is None else similarities(scores),
     )  # fmt: skip
 
 

@@ -189,9 +189,8 @@ def item_images(place_map: PlaceMap, query: Traverse, reference: Traverse | None
 
     Raises EvaluationError where the reference's images are not like those of the query.
     """
-    if place_map.references is not None:
-        own = place_map.references
-        return lambda items: np.asarray(own[items])
+    if place_map.images_of([0]) is not None:
+        return lambda items: np.asarray(place_map.images_of(items))
     if reference is None:
         return None
     if reference.images.shape[1:] != query.images.shape[1:]:

@@ -39,7 +39,7 @@ from evplace.matchers import (
 )
 from evplace.matchers._answering import Found, Reader
 from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
-from evplace.matchers._calibration import LATE, LIVE, checked, measured
+from evplace.matchers._calibration import LATE, LIVE, checked, measured, together
 from evplace.matchers._kept import Kept, after, live_rows
 from evplace.matchers._known import Means, joined, means_ahead, of_drive, probability
 from evplace.matchers._rows import RowCheck, above
@@ -80,6 +80,10 @@ class Bayes:
     def learn(self, route: Route, rows: Callable[[slice], Rows]) -> Learned:
         """See RouteMatcher."""
         return measured(route, rows)
+
+    def learn_more(self, before: Learned, route: Route, rows: Callable[[slice], Rows]) -> Learned:
+        """See LearnsMore."""
+        return together(before, measured(route, rows))
 
     def follow(self, route: Route, distances: bool = False) -> Following:  # noqa: ARG002 - a distance is -d
         """See RouteMatcher."""

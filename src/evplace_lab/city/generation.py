@@ -8,6 +8,7 @@ from pathlib import Path
 from threading import Lock
 from typing import NamedTuple
 
+from evplace.core import folders
 from evplace.core.errors import OutputError
 from evplace.core.settings import to_dict
 from evplace.core.storage import new_file, read_json, write_json
@@ -17,7 +18,7 @@ from evplace_lab.city.recording import record_drive
 from evplace_lab.city.town import build_town
 from evplace_lab.city.warming import warm
 
-SETTINGS_FILE = "city.json"
+SETTINGS_FILE = folders.CITY
 
 
 class Progress(NamedTuple):

@@ -23,6 +23,7 @@ from evplace.core.settings import to_dict
 from evplace.core.storage import locked, new_file, write_json
 from evplace.core.workers import Workers, run_all, workers_of
 from evplace.evaluation import versions
+from evplace.scorers import require
 from evplace_lab.city import Progress as CityProgress
 from evplace_lab.city import generate
 from evplace_lab.reproduction._cases import Case, Method
@@ -90,6 +91,9 @@ def reproduce(
             return _kept(folder / f"{name}.json", family.document(folder, chosen, used, progress), began)
     drives = _real_sets(data) if family.NEEDS == "data" else Cities(Path(city or folder / "city"), folder)
     cases = family.cases(drives, chosen)
+    for case in cases:
+        if case.train is not None:
+            require(case.scorer_part)  # before the city is made, which takes a quarter of an hour
     if city is not None or isinstance(drives, RealSets):
         drives.check(cases)
     with locked(folder / "reproduce"):

@@ -10,6 +10,7 @@ import numpy as np
 
 from evplace.core.errors import InputError
 from evplace.core.events import Events
+from evplace.core.folders import instead
 from evplace.core.settings import make
 from evplace.core.storage import new_folder, read_json
 from evplace.core.workers import Workers
@@ -54,7 +55,10 @@ class Cities:
     def settings(self) -> dict[str, Any]:
         """How the benchmark's drives were made; InputError where there are none."""
         if not (self.city / SETTINGS_FILE).exists():
-            raise InputError(f"{self.city} holds no drives: make them with evplace city -o {self.city}")
+            raise InputError(
+                instead(self.city, SETTINGS_FILE)
+                or f"{self.city} holds no drives: make them with evplace city -o {self.city}"
+            )
         return read_json(self.city / SETTINGS_FILE, "the settings of a city")
 
     def opened(self, drive: str, case: Case) -> Traverse:

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 from evplace.core import families
 from evplace.core.errors import EvplaceError, RecordingError, UnsupportedError
 from evplace.core.events import Size
+from evplace.core.folders import instead
 from evplace.core.storage import is_stream
 from evplace.sources.readers._foreign import foreign
 from evplace.sources.readers._source import Block, Hints, Source, checked_source
@@ -144,6 +145,8 @@ def _found(path: Path, head: bytes, table: bool = False) -> str:
         return "text"
     if (what := foreign(path, head)) is not None:
         raise UnsupportedError(f"{path} is {what}")
+    if (told := instead(path)) is not None:
+        raise RecordingError(told)
     known, what = ", ".join(families.names("readers")), "the folder" if path.is_dir() else "the content"
     raise RecordingError(
         f"{path}: {what} is of no known recording format: known are {known}{families.besides(faults)}"
