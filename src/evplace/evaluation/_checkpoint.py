@@ -39,8 +39,10 @@ OF_NUMPY = ("_reconstruct", "_frombuffer", "scalar")
 class Checkpoint:
     """The file of an evaluation that is under way."""
 
-    def __init__(self, path: Path, localizer: Localizer, query: Traverse, truth: Truth, answers: str) -> None:
-        self._path, self._of = path, (localizer, query, truth, answers)
+    def __init__(
+        self, path: Path, localizer: Localizer, query: Traverse, truths: list[Truth], answers: str
+    ) -> None:
+        self._path, self._of = path, (localizer, query, truths, answers)
         self._parts = {
             type(part).__module__.partition(".")[0] for part in (localizer.matcher, localizer.map.scorer)
         }
@@ -103,18 +105,19 @@ class _Reader(pickle.Unpickler):
         return found
 
 
-def _key(localizer: Localizer, query: Traverse, truth: Truth, answers: str) -> str:
+def _key(localizer: Localizer, query: Traverse, truths: list[Truth], answers: str) -> str:
     """A checksum of all that the answers and their figures depend on."""
     place_map = localizer.map
-    about = [__version__, answers, place_map.settings, localizer.settings, truth.rule, truth.n_items]
+    about = [__version__, answers, place_map.settings, localizer.settings, [truth.rule for truth in truths]]
     found = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
     for name, part in sorted([*place_map.content.items(), *(place_map.learned or {}).items()]):
         found.update(name.encode())
         found.update(part if isinstance(part, bytes) else np.ascontiguousarray(part).data)
-    for array in (query.t_us, query.counts, truth.judged):
+    for array in (query.t_us, query.counts, *(truth.judged for truth in truths)):
         found.update(np.ascontiguousarray(array).data)
     for start in range(0, len(query), BLOCK):
         found.update(np.ascontiguousarray(query.images[start : start + BLOCK]).data)
-    for _, right in truth.blocks():
-        found.update(np.packbits(right).data)
+    for truth in truths:
+        for _, right in truth.blocks():
+            found.update(np.packbits(right).data)
     return found.hexdigest()

@@ -17,11 +17,11 @@ from evplace.core.errors import MissingExtraError
 from evplace.core.tables import rows_of
 from evplace.core.workers import serve
 from evplace.evaluation import Result, sample
-from evplace.evaluation._evaluate import item_images, judged
+from evplace.evaluation._evaluate import Heard, hear, item_images, judged
 from evplace.evaluation.sweeps import sweep
 from evplace.evaluation.truth import Truth
 from evplace.imaging.traverse import Traverse
-from evplace.localizer import Answered, Answers, Localizer
+from evplace.localizer import Answers, Localizer
 from evplace.matchers import RouteMatcher
 from evplace.matchers.best import Best
 from evplace.matchers.local import Local
@@ -108,18 +108,15 @@ def _answer(
     truths = drives.truths(place_map, query, case)
     found: dict[str, Any] = {}
     for timing in TIMINGS:
-        answered = where.answers(query, timing, rows.get(timing))
-        rows[timing] = answered.rows
-        found[timing] = _by_rules(case, where, query, answered, truths, timing)
+        heard = hear(
+            where, query, list(truths.values()), timing, rows.get(timing), case.swept or None,
+            checkpoint=runs.checkpoint(case),
+        )  # fmt: skip
+        if heard.rows is not None:  # in memory, or needed for a curve: they serve the next case
+            rows[timing] = heard.rows
+        found[timing] = _by_rules(case, where, query, heard, list(truths))
         if case.keep and timing == "live":
-            _keep(
-                case,
-                judged(where, query, answered, next(iter(truths.values())), timing),
-                place_map,
-                query,
-                day,
-                runs,
-            )
+            _keep(case, judged(where, query, heard, 0), place_map, query, day, runs)
     taken = {"cpu_s": round(time.process_time() - began, 2)}
     taken["train_cpu_s"] = place_map.info.get("train_cpu_s", 0.0)
     runs.keep(case, {**found, **taken})
@@ -136,20 +133,18 @@ def _keep(
 
 
 def _by_rules(
-    case: Case,
-    where: Localizer,
-    query: Traverse,
-    answered: Answered,
-    truths: dict[str, Truth],
-    timing: Answers,
+    case: Case, where: Localizer, query: Traverse, heard: Heard, rules: list[str]
 ) -> dict[str, Any]:
     """Rule -> figures, and by the first rule, which is the paper's, the curve where it is wanted."""
     found: dict[str, Any] = {}
-    for rule, truth in truths.items():
-        result = judged(where, query, answered, truth, timing)
+    for number, rule in enumerate(rules):
+        result = judged(where, query, heard, number)
         found[rule] = {"figures": result.figures}
-        if case.swept and len(found) == 1:
-            found[rule]["curve"] = _curve(where, answered.rows, query, result, truth, timing).tolist()
+        if case.swept and not number:
+            assert heard.rows is not None
+            found[rule]["curve"] = _curve(
+                where, heard.rows, query, result, heard.truths[0], heard.answers
+            ).tolist()
     return found
 
 
