@@ -1,8 +1,8 @@
 """evplace as a baseline of Event-LAB: copy this file and evplace_vpr.yaml into its folder `baselines`.
 
-Then name the class in baselines/get_baseline.py and the command in config.yaml, as its page on contributing
-Then name the class in baselines/get_baseline.py and the command in config.yaml, as its documentation says, and
-install evplace into its environment. It reads the recordings that Event-LAB has formatted,
+Then name the class in baselines/get_baseline.py and the command in config.yaml, as its documentation says,
+and install evplace into its environment. It reads the recordings that Event-LAB has formatted, learns the
+reference by evplace's own scorers, and saves one matrix (references, queries), larger is better.
 """
 
 from __future__ import annotations

@@ -33,9 +33,9 @@ __all__ = ["OURS", "Given", "Rule", "Submission", "Table", "Task", "bench", "che
 FORMAT = "evplace-bench-1"
 Watch = Callable[[int, int, str], None]
 FIGURES = {
-    "accuracy_seen": "accuracy", "recall@1_seen": "R@1", "recall@5_seen": "R@5", "recall@20_seen": "R@20",
-    "average_precision": "AP", "recall_at_full_precision": "R@100%P", "auroc": "AUROC",
-    "false_accept_rate": "false accepts", "chance_seen": "chance",
+    "accuracy": "accuracy", "accuracy_seen": "of seen", "recall@1_seen": "R@1", "recall@5_seen": "R@5",
+    "recall@20_seen": "R@20", "average_precision": "AP", "recall_at_full_precision": "R@100%P",
+    "auroc": "AUROC", "false_accept_rate": "false accepts", "chance_seen": "chance",
 }  # fmt: skip
 """Figure of a result -> the head of its column, all in %."""
 
@@ -189,12 +189,13 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
     for query in dict.fromkeys(row["query"] for row in rows):
         for row in (row for row in rows if row["query"] == query):
             cells = [_percent(row.get(name)) for name in FIGURES]
-            cells[1] += _bracket(row)
+            cells[2] += _bracket(row)
             mark = "" if row["held_out"] else " *"
             lines.append([query, row["method"] + mark, *cells])
     rule = f"right by {document['rule']}; {document['input']}"
+    heads = ["query", "method", *FIGURES.values()]
     yield Table(
-        f"Of the images whose place the map has, in % ({rule})", ["query", "method", *FIGURES.values()], lines
+        f"In %, {rule}; R@1, R@5 and R@20 of the scores alone, on images whose place is known", heads, lines
     )
     conditions = list(dict.fromkeys(row["condition"] for row in rows))
     lines = [
@@ -216,7 +217,7 @@ def _means(rows: list[dict[str, Any]], conditions: Sequence[str]) -> list[str]:
 def _pair(rows: list[dict[str, Any]]) -> str:
     """Mean accuracy and recall@1."""
     cells = []
-    for name in ("accuracy_seen", "recall@1_seen"):
+    for name in ("accuracy", "recall@1_seen"):
         known = [row[name] for row in rows if row.get(name) is not None]
         cells.append(_percent(sum(known) / len(known) if known else None))
     return ", ".join(cells)

@@ -24,6 +24,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 from evplace.cli._output import note, print_json, print_table, progress, say
 from evplace.core.errors import SettingsError
 from evplace_lab.benchmark import OURS, Given, Rule, Submission, bench, check, tables, tasks_of
+from evplace_lab.benchmark._expected import deviations
 from evplace_lab.benchmark._exports import export
 
 Layout = Literal["query-reference", "reference-query"]
@@ -104,6 +105,8 @@ def run(args: Args) -> int:
         return 0
     for table in tables(document):
         print_table(*table)
+    for deviation in deviations(document, args.city):
+        note(deviation)
     say(f"Kept in {args.out}/bench.json; evplace report {args.out} makes a page of it")
     return 0
 
