@@ -37,7 +37,7 @@ ORDER = {
     "evplace.scorers": "_reduction _compressed _indexed _distances _seqslam_images _network",
     "evplace.scorers._network": "network_onnx network augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
-    "evplace_lab": "city descriptor reproduction report demonstration cli",
+    "evplace_lab": "city descriptor reproduction report demonstration benchmark cli",
 }
 """Package -> its parts in the order of the data: a part imports only parts before it, or files of its own."""
 
