@@ -6,6 +6,8 @@ Examples:
   evplace bench --city city --method a=a/ --method b=b/ --matchers best hmm -o out
   evplace bench check --city city --method mine=mine/          only whether all fits, and what it is taken for
   evplace bench export --city city -o layout                   the tasks and our lists in MegaEvent's layout
+  evplace bench robustness -o out                              what is lost when a drive is worse, in minutes
+  evplace bench robustness -o out --kinds noise lateral
 
 The map is day-1; a query drive's rows are all its images, its columns all images of day-1, in their order.
 docs/protocol.md says which files are read, what is frozen and what counts. OUT gets bench.json and results;
@@ -23,9 +25,10 @@ from tyro.constructors import PrimitiveConstructorSpec
 
 from evplace.cli._output import note, print_json, print_table, progress, say
 from evplace.core.errors import SettingsError
-from evplace_lab.benchmark import OURS, Given, Rule, Submission, bench, check, tables, tasks_of
+from evplace_lab.benchmark import OURS, Given, Rule, Submission, bench, check, robustness, tables, tasks_of
 from evplace_lab.benchmark._expected import deviations
 from evplace_lab.benchmark._exports import export
+from evplace_lab.benchmark._robust_page import page
 
 Layout = Literal["query-reference", "reference-query"]
 
@@ -49,10 +52,11 @@ _NAMED = PrimitiveConstructorSpec(
 class Args:
     """Flags of `evplace bench`."""
 
-    city: Path
+    what: tyro.conf.Positional[Literal["judge", "check", "export", "robustness"]] = "judge"
+    """judge; check: read the methods' files and say what they are taken for; export: write the tasks;
+    robustness: make a street's drive worse in many ways, and see what is still found."""
+    city: Path | None = None
     """Drives that `evplace city` made."""
-    what: tyro.conf.Positional[Literal["judge", "check", "export"]] = "judge"
-    """judge; check: read the methods' files and say what they are taken for; export: write the tasks."""
     method: Annotated[
         tuple[Annotated[tuple[str, str], _NAMED], ...],
         tyro.conf.UseAppendAction,
@@ -76,13 +80,26 @@ class Args:
     """What the rows and columns of a method's matrices are; by default what fits their shape."""
     distances: bool = False
     """Smaller is better in the methods' matrices."""
+    kinds: tuple[str, ...] = ()
+    """For robustness: only these, for example noise lateral."""
+    workers: int | None = None
+    """For robustness: processes; one a core if not given."""
     json: bool = False
     """Print one JSON object."""
 
 
 def run(args: Args) -> int:
-    """Judge, check or export."""
-    tasks = tasks_of(args.city, args.input, args.queries, args.rule)
+    """Judge, check, export, or make worse."""
+    if args.what == "robustness":
+        return _robustness(args)
+    if args.city is None:
+        raise SettingsError("say which drives: `city`, a folder that evplace city has made")
+    return _on_a_city(args, args.city)
+
+
+def _on_a_city(args: Args, city: Path) -> int:
+    """Judge, check or export on a city's drives."""
+    tasks = tasks_of(city, args.input, args.queries, args.rule)
     if args.what == "export":
         files = export(tasks, args.out)
         print_json({"files": [str(file) for file in files]}) if args.json else say(*map(str, files))
@@ -105,7 +122,7 @@ def run(args: Args) -> int:
         return 0
     for table in tables(document):
         print_table(*table)
-    for deviation in deviations(document, args.city):
+    for deviation in deviations(document, city):
         note(deviation)
     say(f"Kept in {args.out}/bench.json; evplace report {args.out} makes a page of it")
     return 0
@@ -124,4 +141,20 @@ def _checked(args: Args, found: list[tuple[str, str, Given]]) -> int:
         note("there is no method to check: give one by --method NAME=PATH")
         return 2
     print_table("All files fit", ("method", "query", "taken for", "references a query"), rows)
+    return 0
+
+
+def _robustness(args: Args) -> int:
+    """A street's drive, made worse."""
+    with progress("making it worse") as show:
+        document = robustness.robustness(
+            args.out, args.kinds, args.workers, lambda at: show(round(at.share * 1000), 1000, at.drive), show
+        )
+    written = page(document, args.out / "robustness.html")
+    if args.json:
+        print_json(document)
+        return 0
+    for table in robustness.tables(document):
+        print_table(*table)
+    say(f"Kept in {args.out}/robustness.json; with curves: {written}")
     return 0
