@@ -148,6 +148,8 @@ class Route(NamedTuple):
     """What the map's images usually show, as in Seen."""
     learned: Learned | None = None
     """What `learn` has given for this map; None where it was not asked."""
+    left_out: int = 0
+    """Items of the map that these are not all of; then rows are z-scores by all of them."""
 
 
 class Following(Protocol):
@@ -167,7 +169,7 @@ class Continuing(Following, Protocol):
     def continued(self, route: Route, came_from: NDArray[np.int64]) -> Following:
         """On other items of the same map; `came_from` (items,) is the number of each so far, -1 of a new one.
 
-        Queries go on being numbered.
+        Queries go on being numbered. See `Route.left_out` for rows of a part of a map.
         """
 
 
