@@ -145,8 +145,8 @@ def ask(folder: Path, asked: Path) -> None:
     print(
         f"{about['searcher']}, {about['items']} x {about['dimensions']}: {middle:.2f} ms ({low:.2f} to "
         f"{high:.2f}), recall@1 {share:.3f} of {whole:.3f} = {share / whole:.3f}, the same reference "
-        f"{(found == best).mean():.3f}; opened in {took_open:.0f} ms; {after[0] - before[0]:.0f} MB, "
-        f"of which no file's {after[1] - before[1]:.0f}",
+        f"{(found == best).mean():.3f}; opened in {took_open:.0f} ms; {after[0] - before[0]:.0f} MB, of "
+        f"which no file's {after[1] - before[1]:.0f}",
         flush=True,
     )
 

@@ -88,10 +88,9 @@ class Streets:
     def _mixed(self, one: Vectors, other: Vectors, mirror: Vectors, share: float) -> Vectors:
         """What all images have in common is neither blended nor mirrored; a blend is as long as its parts."""
         parts = np.cos(share) * (one - self._mean), np.sin(share) * (other - self._mean)
-        apart = parts[0] + parts[1]
-        long = np.sqrt(sum(np.square(part).sum(-1, keepdims=True) for part in parts))
-        apart *= long / np.linalg.norm(apart, axis=-1, keepdims=True)
-        return np.asarray(self._mean + apart * mirror, np.float32)
+        mixed = self._mean + (parts[0] + parts[1]) * mirror
+        squares = np.cos(share) ** 2 * np.square(one).sum(-1) + np.sin(share) ** 2 * np.square(other).sum(-1)
+        return np.asarray(mixed * np.sqrt(squares / np.square(mixed).sum(-1))[..., None], np.float32)
 
     def _blend(self, street: int) -> tuple[int, int, Vectors, float]:
         """Two stretches by where they begin, the signs of the components, and how much each counts."""

@@ -198,9 +198,9 @@ class Localizer:
             yield Match(t_us, -1, -1, None, np.nan, "unseen", compared=region.compared)
             return
         self._times_us[self._stepped] = t_us, region.compared
-        row = self.rows(mean[None])[0] if region.items is None else self.row_of(mean, region.items)
         with families.blaming("matchers", self.matcher):
-            self._following.within(region.items)
+            wanted = self._following.within(region.items)
+        row = self.rows(mean[None])[0] if wanted is None else self.row_of(mean, wanted)
         yield from self._matches(self._step(row, seen))
 
     def match_traverse(self, traverse: Traverse) -> Iterator[Match]:

@@ -151,6 +151,8 @@ class Route(NamedTuple):
     own: Sequence[NDArray[np.int64]] | None = None
     """The item of each of the images that `learn` may ask rows of, for each drive of the map, one behind the
     other; None where these are the items' own, one each, and a row also says how like itself an image is."""
+    left_out: int = 0
+    """Items of the map that these are not all of; then rows are z-scores by all of them."""
 
 
 class Following(Protocol):
@@ -170,7 +172,7 @@ class Continuing(Following, Protocol):
     def continued(self, route: Route, came_from: NDArray[np.int64]) -> Following:
         """On other items of the same map; `came_from` (items,) is the number of each so far, -1 of a new one.
 
-        Queries go on being numbered.
+        Queries go on being numbered. See `Route.left_out` for rows of a part of a map.
         """
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.zscores import ordered, z_by
 from evplace.matchers import Answer, Continuing, Following, Matcher, Route, Row, Seen
 from evplace.matchers._drives import follow
 
@@ -16,16 +17,18 @@ class InParts:
 
     def __init__(self, matcher: Matcher, route: Route, distances: bool) -> None:
         self._matcher, self._route, self._distances = matcher, route, distances
+        many = len(route.position)
+        self._usual = np.arange(many)[ordered(many)]
         self._items: Items | None = None
         self._following: Following | None = None
         self._continuing = True
         """Whether the matcher sees the items that are compared alone, and goes on with others."""
 
-    def within(self, items: Items | None) -> None:
-        """The next rows are of these items, sorted; None: of all.
+    def within(self, items: Items | None) -> Items | None:
+        """Only these items, sorted, are compared from now on; None: all. Gives those that rows are to be of.
 
-        A matcher that cannot go on with others sees all items all the time, those that were not compared as
-        the least alike.
+        These are those that tell what is usual on the map, and then the items. A matcher that cannot go on
+        with others sees all items all the time, those that were not compared as the least alike.
         """
         if self._following is None:
             self._begin(items)
@@ -34,14 +37,18 @@ class InParts:
             came_from = _numbers_in(self._items, items, len(self._route.position))
             self._following = self._following.continued(_part(self._route, items), came_from)
         self._items = items
+        return None if items is None else np.concatenate([self._usual, items])
 
     def step(self, row: Row, seen: Seen) -> list[Answer]:
-        """See Following; the row has a score for each of the items that `within` said."""
+        """See Following; the row has a score for each of the items that `within` gave."""
         following = self._following or self._begin(None)
-        if self._items is None or self._continuing:
-            return self._of_map(following.step(row, seen))
-        whole = np.full(len(self._route.position), row.min(), row.dtype)
-        whole[self._items] = row
+        if self._items is None:
+            return following.step(row, seen)
+        usual, some = np.split(row, [len(self._usual)])
+        if self._continuing:
+            return self._of_map(following.step(z_by(usual, some), seen))
+        whole = np.full(len(self._route.position), some.min(), some.dtype)
+        whole[self._items] = some
         return following.step(whole, seen)
 
     def finish(self) -> list[Answer]:
@@ -75,7 +82,12 @@ def _part(route: Route, items: Items | None) -> Route:
     if items is None:
         return route
     times = None if route.t_us is None else route.t_us[items]
-    return route._replace(position=route.position[items], heading_deg=route.heading_deg[items], t_us=times)
+    return route._replace(
+        position=route.position[items],
+        heading_deg=route.heading_deg[items],
+        t_us=times,
+        left_out=len(route.position) - len(items),
+    )
 
 
 def _numbers_in(before: Items | None, now: Items | None, many: int) -> Items:

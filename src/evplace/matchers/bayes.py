@@ -123,12 +123,13 @@ class _Live:
         self._settings = settings
         self._threshold, self._measured = settings._threshold(route, LIVE), LIVE in learned
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
-        self._reader = Reader(self._filter.ways)
+        self._reader, self._is_part = Reader(self._filter.ways, route.left_out), route.left_out > 0
         self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
 
     def step(self, row: Row, seen: Seen) -> list[Answer]:
         """See Following."""
-        z = robust_z(self._check(row[None])[0])
+        row = self._check(row[None])[0]
+        z = np.asarray(row, np.float32) if self._is_part else robust_z(row)
         weight, drive_s = self._clock.see(seen)
         if drive_s is not None:
             self._filter.move(drive_s)
@@ -167,7 +168,7 @@ class _Lagging:
         self._threshold, self._measured = settings._threshold(route, LATE), LATE in learned
         self._lag_us = round(settings.lag_s * 1e6)
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
-        self._reader = Reader(self._filter.ways)
+        self._reader, self._is_part = Reader(self._filter.ways, route.left_out), route.left_out > 0
         self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
         self._waiting: deque[_Seen] = deque()
         self._moments: deque[Moment] = deque()
@@ -175,7 +176,8 @@ class _Lagging:
 
     def step(self, row: Row, seen: Seen) -> list[Answer]:
         """See Following."""
-        z = robust_z(self._check(row[None])[0])
+        row = self._check(row[None])[0]
+        z = np.asarray(row, np.float32) if self._is_part else robust_z(row)
         weight, drive_s = self._clock.see(seen)
         if drive_s is not None:
             self._moments.append(self._filter.moment)
