@@ -22,7 +22,8 @@ CHUNK = 1 << 24
 def empty_rows(queries: int, items: int, kind: np.dtype[Any] | type[np.float32] = np.float32) -> Rows:
     """(queries, items) zeros, of float32 or another `kind`.
 
-    InputError where neither memory nor disk should hold them. Of a table in a file, the system holds in memory what it has room for.
+    InputError where neither memory nor disk should hold them. Of a table in a file, the system holds in
+    memory what it has room for.
     """
     size = queries * items * np.dtype(kind).itemsize
     if size <= MEMORY_BYTES:
