@@ -13,7 +13,7 @@ from evplace.evaluation import Result, _checkpoint
 from evplace.evaluation._evaluate import evaluate
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
-from evplace.matchers import _kept
+from evplace.matchers import _kept, _traces
 from evplace.placemap import PlaceMap
 
 MATCHERS = [name for name, _ in families.loadable("matchers")]
@@ -105,10 +105,13 @@ def test_a_matcher_that_cannot_be_kept_is_told_once(
 def test_rows_that_are_not_kept_give_the_same_figures(
     image_map: PlaceMap, night: Traverse, answers: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    before = evaluate(Localizer(image_map, "bayes"), night, answers=answers)  # type: ignore[arg-type]
     monkeypatch.setattr(_kept, "MEMORY_BYTES", 0)
+    monkeypatch.setattr(_traces, "BLOCK", 8)
     for matcher in ("hmm", "bayes"):
         kept = evaluate(Localizer(image_map, matcher), night, answers=answers, keep_scores=True)  # type: ignore[arg-type]
         flat = evaluate(Localizer(image_map, matcher), night, answers=answers, keep_scores=False)  # type: ignore[arg-type]
         assert flat.scores is None
         assert kept.scores is not None
         assert flat.figures == kept.figures
+    assert flat.figures == before.figures

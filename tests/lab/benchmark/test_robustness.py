@@ -78,8 +78,8 @@ def test_a_camera_elsewhere_is_rendered_anew(tmp_path: Path) -> None:
     from evplace_lab.city import generate
 
     settings = CitySettings(
-        fps=30, width=32, height=24, sensors=("ideal",), route_length_m=60.0, conditions=("night",), paths=(1,),
-        keep_events=True,
+        fps=30, width=32, height=24, sensors=("ideal",), route_length_m=60.0, conditions=("night",),
+        paths=(1,), keep_events=True,
     )  # fmt: skip
     (folder,) = generate(tmp_path / "city", settings, workers=1)
     night = Night.load(folder, settings)
