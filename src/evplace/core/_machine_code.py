@@ -252,12 +252,10 @@ def compiles() -> bool:
 
 def _compiled(loop: Any, kinds: Kinds, name: str) -> Code:
     """The code, or UNFIT; `name` is that of the entry, and no other entry's."""
-    from numba.core.errors import NumbaError
-
     _state.compiles = True
     try:
         return _compiled_alone(loop, kinds, name)
-    except NumbaError:  # it makes arrays; what else is wrong with it, numba itself will say
+    except Exception:  # numba fails in many ways where arrays are made; all else it will say again
         return UNFIT
     finally:
         _state.compiles = False
