@@ -41,6 +41,16 @@ def filled(values: np.ndarray, number: int) -> None:
 
 
 @njit(cache=True)
+def within(bounds: tuple[tuple[float, int], int], values: np.ndarray) -> int:
+    """How many values lie in a range, and one number more."""
+    (low, high), more = bounds
+    count = more
+    for value in values:
+        count += low <= value < high
+    return count
+
+
+@njit(cache=True)
 def doubled(values: np.ndarray) -> np.ndarray:
     """A loop that makes an array."""
     return values * 2
@@ -56,7 +66,7 @@ def half_of(number: int, by: int) -> float:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder for what is kept; loops know of no entry yet."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    for loop in (weighed, filled, doubled, half_of):
+    for loop in (weighed, filled, within, doubled, half_of):
         monkeypatch.setattr(loop, "_entries", {})
     return tmp_path / "evplace"
 
@@ -69,6 +79,8 @@ def test_it_says_what_numba_says_of_all_kinds_of_arguments(monkeypatch: pytest.M
     found = [weighed(Pair(values, None), *others) for values, *others in calls]
     assert all(weighed._entries.values()), "numba itself was called"
     assert found == [weighed.dispatcher(Pair(values, None), *others) for values, *others in calls]
+    assert within(((0.5, 4), 7), small.ravel()) == 3 + 7
+    assert all(within._entries.values())
 
 
 def test_what_is_not_plain_is_called_by_numba() -> None:

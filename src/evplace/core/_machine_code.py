@@ -57,8 +57,8 @@ ALONE = WITHOUT_WRAPPERS | {"_nrt": False}
 """And for what must make no arrays: it does not count references to them either."""
 
 Kinds = tuple[Any, ...]
-"""Of arguments, one after another: dtype and dimensions of an array, the class of a number, that of a named
-tuple and the kinds of its fields, None."""
+"""Of arguments, one after another: dtype and dimensions of an array, the class of a number, class and length
+of a tuple and then the kinds of its fields, None."""
 Entry = Callable[[list[Any]], Any]
 """Calls a loop with addresses and numbers, and gives what it returns."""
 
@@ -107,8 +107,8 @@ def _flatten(arguments: tuple[Any, ...], kinds: list[Any], values: list[Any]) ->
         elif isinstance(value, np.generic) and value.dtype.char in NUMBERS:
             kinds.append(kind)
             values.append(value.item())
-        elif hasattr(kind, "_fields"):
-            kinds.append(kind)
+        elif isinstance(value, tuple):
+            kinds += (kind, len(value))
             _flatten(value, kinds, values)
         else:
             raise UnfitError
@@ -298,8 +298,9 @@ def _entry_text(kinds: Kinds, name: str) -> tuple[str, list[Any]]:
             taken.extend(types.CPointer(types.CPointer(of)) for of in (from_dtype(kind), types.intp))
             lengths = "".join(f"shape_{at}[{SHAPE}][{axis}], " for axis in range(dimensions))
             return f"carray(array_{at}[{DATA}], ({lengths}))"
-        if hasattr(kind, "_fields"):
-            return f"class_{at}({''.join(f'{value()}, ' for _ in kind._fields)})"
+        if issubclass(kind, tuple):
+            fields = "".join(f"{value()}, " for _ in range(next(left)[1]))
+            return f"({fields})" if kind is tuple else f"class_{at}({fields})"
         parameters.append(f"number_{at}")
         is_float = issubclass(kind, float | np.floating)
         taken.append(types.float64 if is_float else types.int64)
@@ -376,6 +377,6 @@ def _handed(kind: Any) -> list[Any]:
     """What is handed over of one kind."""
     if isinstance(kind, np.dtype):
         return [ctypes.c_void_p, ctypes.c_void_p]
-    if kind is None or isinstance(kind, int) or hasattr(kind, "_fields"):
+    if kind is None or isinstance(kind, int) or issubclass(kind, tuple):
         return []
     return [ctypes.c_double if issubclass(kind, float | np.floating) else ctypes.c_int64]
