@@ -130,9 +130,13 @@ def _spacing(position: Floats) -> float:
 def images_of(parts: Sequence[Part], items: Ints) -> NDArray[np.uint8]:
     """(n, h, w) or (n, h, w, C): of each of some items (n,), the first drive's reference that it has."""
     item = np.concatenate([part.item for part in parts])
-    drive = np.repeat(np.arange(len(parts)), [len(part.item) for part in parts])
-    own = np.concatenate([np.arange(len(part.item)) for part in parts])
+    ends = np.cumsum([len(part.item) for part in parts])
     order = np.argsort(item, kind="stable")
     chosen = order[np.searchsorted(item[order], items)]
-    images = [parts[drive[one]].map.images_of(own[one : one + 1]) for one in chosen]
-    return np.concatenate([one for one in images if one is not None])
+    found = np.empty((len(items), *parts[0].map.image_shape), np.uint8)
+    for number, part in enumerate(parts):
+        own = np.searchsorted(ends, chosen, "right") == number
+        images = part.map.images_of(chosen[own] - ends[number] + len(part.item))
+        if images is not None:
+            found[own] = images
+    return found
