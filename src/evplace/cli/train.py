@@ -5,6 +5,7 @@ Examples:
   evplace train day.aedat4 --track day.nmea -o campus.evp --mask-hot later drives are cleaned like it
   evplace train day -o campus.evp --preset paper --seed 1            the paper's network, on a traverse folder
   evplace train day -o campus.evp --scorer ncc --set sigma=2         no training: images are the map
+  evplace train day -o campus.evp --index bits                       of many references few are compared
   evplace train day -o campus.evp --run-length 10                    no GPS: ten images are a place
   evplace train brisbane/ --drive sunset1 -o sunset1.evp             a drive of a data set, with its GPS
   evplace train day dusk night -o city.evp                           traverse folders with their tracks
@@ -40,7 +41,7 @@ from evplace.imaging.windows import WindowSettings
 from evplace.matchers.local import Local
 from evplace.placemap import MARK, PlaceMap, add, default_scorer, named, names_of, train
 from evplace.places import PlaceGrid, PlaceRuns, Places
-from evplace.scorers import Descriptor, Learning, Scorer
+from evplace.scorers import Descriptor, Learning, Scorer, require
 from evplace.scorers.network import TrainSettings
 from evplace.sources.cleaning import CleaningSettings
 
@@ -71,6 +72,9 @@ class Args(TrackFlags, DriveFlags):
     of the preset."""
     matcher: Annotated[str | None, a_part_of("matchers")] = None
     """What the map remembers to be matched with. Default: bayes, and local where the items are places."""
+    index: Annotated[str | None, a_part_of("searchers")] = None
+    """For fused: how references are searched; `evplace list searchers` says what each does. Default: exact,
+    which compares with all of them, up to 300,000, beyond that faiss."""
     set: Pairs = ()
     """A setting of the scorer, as name=value."""
     preset: Annotated[str | None, a_preset_of("scorers")] = None
@@ -96,6 +100,7 @@ def run(args: Args) -> int:
     if len(args.sources) > 1:
         _check_several(args)
     scorer = _scorer(args)
+    require(scorer)
     drives = [_opened(args, source) for source in args.sources]
     reference = drives[0]
     places = _places(args, reference)
@@ -167,12 +172,22 @@ def _places(args: Args, reference: Traverse) -> Places:
 def _scorer(args: Args) -> Scorer | Descriptor:
     """The scorer with its settings: for one that is trained by these flags, those of the training."""
     name = args.scorer or default_scorer(args.preset)
+    values = dict(args.set)
+    if args.index is not None:
+        _check_indexed(name)
+        values["index"] = args.index
     if name == "network":
-        return make(TrainSettings, dict(args.set), args.train)
+        return make(TrainSettings, values, args.train)
     trained = [name for name in vars(args.train) if name in args.given]
     if trained:
         raise SettingsError(
             f"`{trained[0]}` means nothing for the scorer '{name}': leave it out, or add --scorer network"
         )
-    part: Scorer | Descriptor = families.make("scorers", name, args.preset, dict(args.set))
+    part: Scorer | Descriptor = families.make("scorers", name, args.preset, values)
     return part
+
+
+def _check_indexed(scorer: str) -> None:
+    """SettingsError where a scorer compares with all references, whatever is asked for."""
+    if "index" not in families.settings_of("scorers", scorer)[0].__dataclass_fields__:
+        raise SettingsError(f"`index` means nothing for the scorer '{scorer}': leave it out, or take fused")

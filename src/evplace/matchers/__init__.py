@@ -151,6 +151,8 @@ class Route(NamedTuple):
     own: Sequence[NDArray[np.int64]] | None = None
     """The item of each of the images that `learn` may ask rows of, for each drive of the map, one behind the
     other; None where these are the items' own, one each, and a row also says how like itself an image is."""
+    left_out: int = 0
+    """Items of the map that these are not all of; then rows are z-scores by all of them."""
 
 
 class Following(Protocol):
@@ -161,6 +163,17 @@ class Following(Protocol):
 
     def finish(self) -> list[Answer]:
         """The drive is over: the answers that were still to come."""
+
+
+@runtime_checkable
+class Continuing(Following, Protocol):
+    """A Following that goes on where the drive comes to another part of the map."""
+
+    def continued(self, route: Route, came_from: NDArray[np.int64]) -> Following:
+        """On other items of the same map; `came_from` (items,) is the number of each so far, -1 of a new one.
+
+        Queries go on being numbered. See `Route.left_out` for rows of a part of a map.
+        """
 
 
 @runtime_checkable
@@ -227,9 +240,9 @@ def open_matcher(
 from evplace.matchers._rows import Answers, RowCheck  # noqa: E402 - they are made of what stands above
 
 __all__ = [
-    "Answer", "Answers", "Estimate", "Following", "Judge", "Learned", "LearnsMore", "Matcher", "Matching",
-    "Path", "Route", "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep", "open_matcher",
-    "stepped",
+    "Answer", "Answers", "Continuing", "Estimate", "Following", "Judge", "Learned", "LearnsMore", "Matcher",
+    "Matching", "Path", "Route", "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep",
+    "open_matcher", "stepped",
 ]  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from evplace import places as places_of
 from evplace.core import families
 from evplace.core.errors import EvplaceError, InputError, PlaceMapError
+from evplace.core.folders import instead
 from evplace.core.settings import to_dict
 from evplace.core.storage import new_folder, read_array, sha256, write_array, write_json
 from evplace.drives.to_traverse import open_traverse
@@ -257,7 +258,8 @@ class PlaceMap:
         folder = Path(path)
         what = f"the map {folder}"
         if not (folder / MARK).is_file():
-            raise PlaceMapError(f"{folder} is no map: a map is a folder that `evplace train` has written")
+            made = f"{folder} is no map: a map is a folder that `evplace train` has written"
+            raise PlaceMapError(instead(folder, MARK) or made)
         try:
             about = about_of(folder, what)
             check_sums(folder, what, files_of(about))

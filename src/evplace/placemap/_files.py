@@ -11,6 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from evplace.core import folders
 from evplace.core.errors import InputError, PlaceMapError
 from evplace.core.storage import read_array, read_bytes, read_json, sha256, write_array
 
@@ -20,7 +21,7 @@ FORMAT_OF_SEVERAL = "evplace-map-3"
 OLD_FORMAT = "evplace-map-1"
 """Its recipe and scorer lie in pieces in `settings`."""
 SUMS = "SHA256SUMS"
-MARK = "map.json"
+MARK = folders.MAP
 """What tells a folder that was written here from any other: only such a one is replaced."""
 TIMES = "times.npy"
 DRIVES = "drives"

@@ -20,7 +20,7 @@ from evplace.matchers.local import Local
 from evplace.placemap import Items, PlaceMap
 from evplace.placemap._parts import JoinedRows
 from evplace.places import Places
-from evplace.scorers import Descriptor, Learned, Learning, Scorer, scorer_of, usable
+from evplace.scorers import Descriptor, Learned, Learning, Scorer, require, scorer_of, usable
 from evplace.scorers.fused import Fused
 from evplace.scorers.network import Network
 
@@ -50,11 +50,13 @@ def train(
     """
     named = default_scorer(preset) if scorer is None else scorer
     part: Scorer | Descriptor = families.make("scorers", named, preset, settings)
+    chosen = None if matcher is None else families.make("matchers", matcher, None, {})
+    require(part)  # what is wrong with the parts is said before the work
     made = learned_map(reference, places, part, learning or Learning())
-    if matcher is None:
+    if chosen is None:
         by = preset if preset in Local.presets and made.items.are_places else None
         return calibrate(made, Local.presets[by] if by else None)
-    return calibrate(made, families.make("matchers", matcher, None, {}))
+    return calibrate(made, chosen)
 
 
 def default_scorer(preset: str | None) -> str:

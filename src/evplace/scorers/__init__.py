@@ -19,7 +19,7 @@ from evplace.core import families
 from evplace.core.errors import PartError, PlaceMapError, TraverseError
 from evplace.imaging.traverse import Traverse
 from evplace.places import Places
-from evplace.scorers._search import Exact
+from evplace.searchers.exact import ExactSearch
 
 Rows = NDArray[np.float32]
 """(queries, items) scores."""
@@ -61,8 +61,20 @@ class OpenScorer(Protocol):
         """(n, h, w) or (n, h, w, C) uint8 -> (n, items)."""
 
 
+@runtime_checkable
+class ComparesSome(Protocol):
+    """An OpenScorer that can also compare with some items alone, which is faster."""
+
+    def some(self, images: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        """(n, len(items)) what `rows` would give for these items."""
+
+
 class Scorer(Protocol):
-    """A way to compare, with its settings. A class may have `presets`: names and objects of it."""
+    """A way to compare, with its settings. A class may have `presets`: names and objects of it.
+
+    One that learns by a package that may be missing has `require()`, which raises MissingExtraError then: it
+    is asked before the work.
+    """
 
     def learn(self, reference: Traverse, places: Places, learning: Learning) -> Learned:
         """Learn the drive; `usable` says which of its images have a place."""
@@ -133,10 +145,13 @@ class _DescribedRows:
 
     def __init__(self, descriptor: Descriptor, references: NDArray[np.uint8]) -> None:
         self._descriptor = descriptor
-        self._search = Exact(in_blocks(self._vectors, references))
+        self._search = ExactSearch(in_blocks(self._vectors, references))
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         return self._search.rows(self._vectors(images))
+
+    def some(self, images: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        return self._search.scores(self._vectors(images), items)
 
     def _vectors(self, images: NDArray[np.uint8]) -> Vectors:
         vectors = self._descriptor.describe(images)
@@ -169,6 +184,11 @@ def opened_together(part: Scorer | Descriptor, contents: Sequence[Content]) -> l
         shared = {name: Remembering(one) for name, one in part.parts.items()}
         return [part.open(content, shared) for content in contents]
     return [scorer_of(part).open(content) for content in contents]
+
+
+def require(part: Scorer | Descriptor) -> None:
+    """MissingExtraError where what a scorer learns with is not installed."""
+    getattr(part, "require", lambda: None)()
 
 
 def thinned(part: Scorer | Descriptor, content: Content, items: NDArray[np.int64]) -> Content | None:
