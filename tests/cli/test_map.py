@@ -100,4 +100,5 @@ def test_flags_of_one_drive_are_refused_for_several(drives: Path, tmp_path: Path
     days = (drives / "day", drives / "dusk")
     told = fault(capsys, "train", *days, "--track", drives / "late.csv", "-o", tmp_path / "map")
     assert "--track is of one drive, and 2 are given" in told
+    assert "learns places" in fault(capsys, "train", *days, "--preset", "paper", "-o", tmp_path / "map")
     assert not (tmp_path / "map").exists()
