@@ -41,7 +41,7 @@ class Args(WorkerFlags):
     city: Path | None = None
     """Drives that `evplace city` made; without them the benchmark is made in OUT/city."""
     data: Path | None = None
-    """For real: the folder of real sets; its recipes say which, and where in it each lies."""
+    """For real and figure5: the folder of real sets; the recipes say which, and where in it each lies."""
     seeds: int = 3
     """Trainings of each network."""
     inputs: tuple[str, ...] = ()

@@ -52,7 +52,9 @@ def _sections(found: Found, drawn: list[Panel]) -> Html:
     return join(
         _accuracies("table", table, "Accuracy") if table else None,
         _accuracies("real", found.real, "Accuracy on real sets") if found.real else None,
-        _section("curves", "Precision and recall", tag("div", id="panels")) if drawn else None,
+        _section("curves", "Precision and recall", tag("div", id="panels"), _tables.lacking(found))
+        if drawn
+        else None,
         _section("reliability", "Reliability", reliable) if reliable else None,
         _section("ablations", "Ablations", _tables.ablations(changes.rows)) if changes else None,
         _section("look", "A closer look", tag("div", id="look-at")) if results else None,

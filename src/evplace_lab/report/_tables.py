@@ -103,6 +103,20 @@ def ablations(rows: Sequence[Ablation]) -> Html:
     return _scrolled("Ablations", tag("table", head, tag("tbody", *body)))
 
 
+def lacking(found: Found) -> Html:
+    """A panel for each curve's data that are not there, which says what it needs and what to do then."""
+    told = found.curves.rest.get("lacking") if found.curves is not None else None
+    panels = []
+    for one in told if isinstance(told, list) else []:
+        if isinstance(one, dict):
+            needs = f"Needs data: {one.get('needs', '')}"
+            command = tag("code", str(one.get("command", "")))
+            panels.append(
+                tag("div", tag("h3", str(one.get("panel", ""))), tag("p", needs), command, class_="panel")
+            )
+    return tag("div", *panels, class_="grid-2 lacking") if panels else Html()
+
+
 def overview(results: Mapping[str, Result]) -> Html:
     """One row a result, in %."""
     shown = [

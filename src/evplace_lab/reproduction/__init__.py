@@ -28,6 +28,7 @@ from evplace_lab.city import Progress as CityProgress
 from evplace_lab.city import generate
 from evplace_lab.reproduction._cases import Case, Method
 from evplace_lab.reproduction._cities import Cities
+from evplace_lab.reproduction._panels import Panels
 from evplace_lab.reproduction._real_sets import RealSets
 from evplace_lab.reproduction._runs import Runs
 
@@ -89,7 +90,7 @@ def reproduce(
     if family.NEEDS == "nothing":
         with locked(folder / "reproduce"):
             return _kept(folder / f"{name}.json", family.document(folder, chosen, used, progress), began)
-    drives = _real_sets(data) if family.NEEDS == "data" else Cities(Path(city or folder / "city"), folder)
+    drives = _real_sets(data) if family.NEEDS == "data" else _city(city, folder, data)
     cases = family.cases(drives, chosen)
     for case in cases:
         if case.train is not None:
@@ -137,6 +138,11 @@ def _of_city(progress: Progress | None) -> Callable[[CityProgress], None] | None
     if progress is None:
         return None
     return lambda at: progress(round(at.share * 1000), 1000, f"driving {at.drive}")
+
+
+def _city(city: str | Path | None, folder: Path, data: str | Path | None) -> Panels:
+    """The city's drives, by default those in `folder`, and beside them real sets."""
+    return Panels(Path(city or folder / "city"), folder, None if data is None else Path(data))
 
 
 def _real_sets(data: str | Path | None) -> RealSets:

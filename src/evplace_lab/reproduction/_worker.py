@@ -29,11 +29,11 @@ from evplace.placemap import PlaceMap, calibrate, train
 from evplace.scorers import Learning, Rows
 from evplace_lab.reproduction import Drives
 from evplace_lab.reproduction._cases import Case
-from evplace_lab.reproduction._cities import Cities
+from evplace_lab.reproduction._panels import Panels
 from evplace_lab.reproduction._real_sets import RealSets
 from evplace_lab.reproduction._runs import TIMINGS, Runs
 
-KINDS: dict[str, type[Cities] | type[RealSets]] = {kind.__name__: kind for kind in (Cities, RealSets)}
+KINDS: dict[str, type[Panels] | type[RealSets]] = {kind.__name__: kind for kind in (Panels, RealSets)}
 
 
 def work(job: dict[str, Any], say: Callable[[str], None]) -> None:
