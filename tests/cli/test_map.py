@@ -84,7 +84,7 @@ def test_a_recording_is_added_as_the_map_was_made(drives: Path, tmp_path: Path, 
         (("add", "{map}", "{dusk}", "--drives", "x"), "--drives means nothing"),
         (("add", "{map}", "{dusk}", "{dusk}", "--name", "x"), "--name is of one drive, and 2 are given"),
         (("add", "{map}", "{dusk}", "-o", "{map}"), "exists"),
-        (("add", "{dusk}", "{dusk}"), "is no map"),
+        (("add", "{dusk}", "{dusk}"), "is a traverse, not a map"),
         (("add", "{map}", "{day}"), "already, as 'first'"),
     ],
 )

@@ -20,6 +20,7 @@ from made_pages import ROOT, Block, blocks, pages, write_drives
 
 ONLY_READ = {
     "evplace city": "drives for minutes",
+    "evplace bench": "needs that city",
     "evplace demo": "drives for minutes",
     "evplace reproduce": "trains for an hour",
     "evplace report out": "shows what that has made",
