@@ -129,7 +129,9 @@ def image_map(day: Traverse, places: PlaceGrid) -> PlaceMap:
 def sum_again(folder: Path) -> None:
     """Make the sums of a map anew, over all files that lie there."""
     files = sorted(file for file in folder.iterdir() if file.is_file() and file.name != "SHA256SUMS")
-    lines = [f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in files]
+    files += sorted(folder.glob("drives/*/SHA256SUMS"))
+    sums = {file.relative_to(folder): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+    lines = [f"{checksum}  {file.as_posix()}\n" for file, checksum in sums.items()]
     (folder / "SHA256SUMS").write_text("".join(lines))
 
 

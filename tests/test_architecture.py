@@ -23,17 +23,20 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places torch scorers matchers placemap localizer exports serving "
-        "evaluation doctor testing cli"
+        "core sources imaging drives places torch searchers scorers matchers placemap _regions localizer "
+        "exports serving evaluation doctor testing cli"
     ),
-    "evplace.core": "errors folders events grey zscores settings families storage workers drawing",
+    "evplace.core": (
+        "errors folders events grey zscores settings families storage state workers cluster drawing"
+    ),
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",
     "evplace.imaging": (
         "windows _resampling representations tones images activity averaging recipe stream store spacing "
         "traverse sheets"
     ),
     "evplace.drives": "datasets to_traverse",
-    "evplace.scorers": "_search _reduction _compressed _distances _seqslam_images _network",
+    "evplace.searchers": "_loops _turned exact int8 bits faiss",
+    "evplace.scorers": "_reduction _compressed _indexed _distances _seqslam_images _network",
     "evplace.scorers._network": "network_onnx network augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
     "evplace_lab": "city descriptor reproduction report demonstration benchmark cli",

@@ -109,11 +109,20 @@ def show_page(address: str) -> None:
 @contextlib.contextmanager
 def remarks() -> Iterator[None]:
     """Warnings within the block as remarks, once it ends well."""
+    with warned() as texts:
+        yield
+    for text in texts:
+        note(text)
+
+
+@contextlib.contextmanager
+def warned() -> Iterator[list[str]]:
+    """The texts of warnings within the block, once it ends well."""
+    texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        yield
-    for remark in caught:
-        note(str(remark.message))
+        yield texts
+    texts += [str(warning.message) for warning in caught]
 
 
 @contextlib.contextmanager

@@ -6,6 +6,8 @@ Examples:
   evplace localize campus.evp night.aedat4 --format nmea
   evplace localize campus.evp night --matcher seqslam --set ds=20
   evplace localize campus.evp night.aedat4 --mask night_hot_pixels.txt
+  evplace localize campus.evp night.aedat4 --near-m 200 --track night.nmea    a GPS that is good to 200 m
+  evplace localize campus.evp night.aedat4 --near-m 200          near the last match, where there is one
   evplace localize campus.evp night.aedat4 --json              a JSON object a line
   evplace localize campus.evp night.aedat4 --watch             at the camera's pace, as `evplace serve` does
   evplace localize campus.evp udp:3333 --watch                 any source of `evplace list live`
@@ -16,14 +18,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import tyro
 
-from evplace.cli._matcher import MatcherFlags, note_matches
+from evplace.cli._matcher import MatcherFlags, matches_noted
 from evplace.cli._output import USED_GOOD_PART, note, note_guesses
 from evplace.cli._recording import DriveFlags
-from evplace.cli._settings import a_part_of
+from evplace.cli._settings import Part, a_part_of
+from evplace.cli._track import TrackFlags
 from evplace.core.errors import DamagedRecordingError, SettingsError
 from evplace.core.storage import check_new_file, new_file
 from evplace.drives._recorded import packets_onto
@@ -41,8 +44,10 @@ from evplace.sources.simulators.recording import SimulatedRecording
 
 
 @dataclass(frozen=True)
-class Args(MatcherFlags, DriveFlags):
+class Args(MatcherFlags, TrackFlags, DriveFlags):
     """Flags of `evplace localize`."""
+
+    PARTS: ClassVar[tuple[Part, ...]] = (*TrackFlags.PARTS, *MatcherFlags.PARTS)
 
     map: tyro.conf.Positional[Path]
     """A map that `evplace train` wrote."""
@@ -54,6 +59,9 @@ class Args(MatcherFlags, DriveFlags):
     """What is written; `evplace list exports` says what each is. By default the suffix of --out says it."""
     mask: Path | None = None
     """Pixels of this drive to leave out: a text file of x,y lines, or a .npy file."""
+    near_m: float | None = None
+    """Compare only with references within so many metres of where --track says that the drive is, or without
+    one, of the last match; with all of them where neither is known."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -120,7 +128,10 @@ def run(args: Args) -> int:
         check_new_file(args.out, args.overwrite)
     place_map = PlaceMap.load(args.map)
     form = format_of(args.out, "json" if args.json else args.format, place_map)
-    where = Localizer(place_map, args.matcher, args.preset, args.mask, **args.matcher_settings())
+    where = Localizer(
+        place_map, args.matcher, args.preset, args.mask, args.near_m, args.opened_track(),
+        **args.matcher_settings(),
+    )  # fmt: skip
     if args.watch:
         return _watched(where, args)
     matches = _Drive(where, args)
@@ -131,7 +142,8 @@ def run(args: Args) -> int:
     else:
         with new_file(args.out, args.overwrite) as partial, partial.open("w", encoding="utf-8") as file:
             file.writelines(f"{line}\n" for line in lines)
-    note_matches(where, matches.matches, matches.accepted)
+    for text in matches_noted(where, matches.matches, matches.accepted):
+        note(text)
     if matches.fault is not None:
         note(f"{matches.fault}; the good part was localised")
     return USED_GOOD_PART if matches.fault is not None else 0

@@ -33,6 +33,7 @@ MODULES = {
 CLASSES = {
     "live": "evplace.sources.live",
     "representations": "evplace.imaging.representations",
+    "searchers": "evplace.searchers",
     "scorers": "evplace.scorers",
     "matchers": "evplace.matchers",
 }

@@ -70,17 +70,22 @@ def measure(
     settings: Mapping[str, Any] | None = None,
     query_xy: ArrayLike | None = None,
     delay: int | None = None,
+    hits: Floats | None = None,
 ) -> Result:
     """The figures of a matcher's `answers` (queries) by `truth`.
 
-    `scores` (queries, items) adds recall@N; `positions` (items, 2) in metres adds the gallery spacing;
-    `t_us` (queries,), `settings` and the positions, also `query_xy` (queries, 2), are kept with the result;
-    so is `delay`, how many images later an answer was known at most. Queries that the truth knows nothing of
-    are left out and counted. Raises EvaluationError where the parts do not fit or no query is judged.
+    `scores` (queries, items) adds recall@N, and so do their `hits` (queries, N, 3) of `hits_at` in their
+    place; `positions` (items, 2) in metres adds the gallery spacing; `t_us` (queries,), `settings` and the
+    positions, also `query_xy` (queries, 2), are kept with the result; so is `delay`, how many images later an
+    answer was known at most. Queries that the truth knows nothing of are left out and counted. Raises
+    EvaluationError where the parts do not fit or no query is judged.
     """
     _check(answers, truth, scores)
     here, there = _known(query_xy, truth.n_queries), _known(positions, truth.n_items)
-    right, true_item, shares, ranked = _compare_with_truth(answers, truth, scores, here, there)
+    right, true_item, shares, ranked = _compare_with_truth(
+        answers, truth, scores if hits is None else None, here, there
+    )
+    ranked = ranked if hits is None else hits
     seen = true_item >= 0
     accepted = answers.accepted & (answers.item >= 0)
     judged = truth.judged

@@ -14,7 +14,7 @@ SUFFIX = ".csv"
 NEEDS = ""
 COLUMNS = (
     "t_us", "place", "easting", "northing", "score", "state", "latitude", "longitude", "heading_deg",
-    "probability", "uncertainty_m",
+    "probability", "uncertainty_m", "compared",
 )  # fmt: skip
 
 
@@ -32,6 +32,7 @@ def _row(one: Located) -> list[object]:
         match.t_us, match.place, _shown(easting, ".2f"), _shown(northing, ".2f"), _shown(match.score, ".6g"),
         match.state, _shown(one.latitude, ".7f"), _shown(one.longitude, ".7f"), _shown(heading, ".1f"),
         _shown(match.probability, ".4f"), _shown(match.uncertainty_m, ".1f"),
+        match.compared,
     ]  # fmt: skip
 
 

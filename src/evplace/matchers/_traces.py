@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from evplace.core.zscores import robust_z
 from evplace.matchers import Learned, Rows, Seen
 from evplace.matchers._answering import Reader
 from evplace.matchers._belief import WRONG, Clock, Filter, Moment, clock_of, smoothed
+from evplace.matchers._kept import Kept
 from evplace.matchers._known import SIGNS
 from evplace.matchers._ways import Ways
 
@@ -68,9 +70,9 @@ def late(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trac
     out = Trace(np.zeros(len(rows), np.int64), np.zeros((len(rows), SIGNS)), drive.weight)
     starts = _beliefs_at_blocks(ways, rows, drive, wrong)
     reader, message = Reader(ways), None
-    for block in range(len(starts) - 1, -1, -1):
+    for block, start in zip(range(len(starts), -1, -1), chain(starts.backwards(), [None]), strict=True):
         numbers = range(block * BLOCK, min((block + 1) * BLOCK, len(drive.begins)))
-        moments = _moments(ways, rows, drive, wrong, numbers, starts[block])
+        moments = _moments(ways, rows, drive, wrong, numbers, start)
         beliefs, message = smoothed(moments, ways, message)
         for number, belief in zip(numbers, beliefs, strict=True):
             for query in range(drive.begins[number], drive.ends[number]):
@@ -79,23 +81,28 @@ def late(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trac
     return out
 
 
-def _beliefs_at_blocks(ways: Ways, rows: Rows, drive: _Drive, wrong: Floats | None) -> list[Floats | None]:
-    """The belief before each block of moments; None before the first."""
-    starts: list[Floats | None] = [None]
+def _beliefs_at_blocks(ways: Ways, rows: Rows, drive: _Drive, wrong: Floats | None) -> Kept:
+    """The belief before each block of moments but the first, before which there is none."""
+    starts, last = Kept(), None
     for first in range(BLOCK, len(drive.begins), BLOCK):
         numbers = range(first - BLOCK, first)
-        last = _moments(ways, rows, drive, wrong, numbers, starts[-1])[-1]
-        starts.append(last.belief.astype(np.float64))
+        last = _moments(ways, rows, drive, wrong, numbers, last)[-1].belief
+        starts.append(last[None])
     return starts
 
 
 def _moments(
-    ways: Ways, rows: Rows, drive: _Drive, wrong: Floats | None, numbers: range, start: Floats | None
+    ways: Ways,
+    rows: Rows,
+    drive: _Drive,
+    wrong: Floats | None,
+    numbers: range,
+    start: NDArray[np.floating[Any]] | None,
 ) -> list[Moment]:
     """The moments of some numbers, from the belief before them."""
     filter_, out = Filter(ways, wrong), []
     if start is not None:
-        filter_.belief = start.copy()
+        filter_.belief = start.astype(np.float64)
     for number in numbers:
         if number:
             filter_.move(drive.driven_s[number])

@@ -38,8 +38,8 @@ from evplace.matchers import (
     Sweep,
 )
 from evplace.matchers._answering import Found, Reader
-from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
-from evplace.matchers._calibration import LATE, LIVE, checked, measured
+from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed, taken
+from evplace.matchers._calibration import LATE, LIVE, checked, measured, together
 from evplace.matchers._kept import Kept, after, live_rows
 from evplace.matchers._known import Means, joined, means_ahead, of_drive, probability
 from evplace.matchers._rows import RowCheck, above
@@ -81,6 +81,10 @@ class Bayes:
         """See RouteMatcher."""
         return measured(route, rows)
 
+    def learn_more(self, before: Learned, route: Route, rows: Callable[[slice], Rows]) -> Learned:
+        """See LearnsMore."""
+        return together(before, measured(route, rows))
+
     def follow(self, route: Route, distances: bool = False) -> Following:  # noqa: ARG002 - a distance is -d
         """See RouteMatcher."""
         return _Lagging(self, route) if self.lag_s else _Live(self, route)
@@ -116,14 +120,16 @@ class _Live:
 
     def __init__(self, settings: Bayes, route: Route) -> None:
         learned = checked(route.learned)
+        self._settings = settings
         self._threshold, self._measured = settings._threshold(route, LIVE), LIVE in learned
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
-        self._reader = Reader(self._filter.ways)
+        self._reader, self._is_part = Reader(self._filter.ways, route.left_out), route.left_out > 0
         self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
 
     def step(self, row: Row, seen: Seen) -> list[Answer]:
         """See Following."""
-        z = robust_z(self._check(row[None])[0])
+        row = self._check(row[None])[0]
+        z = np.asarray(row, np.float32) if self._is_part else robust_z(row)
         weight, drive_s = self._clock.see(seen)
         if drive_s is not None:
             self._filter.move(drive_s)
@@ -135,6 +141,12 @@ class _Live:
     def finish(self) -> list[Answer]:
         """See Following."""
         return []
+
+    def continued(self, route: Route, came_from: NDArray[np.int64]) -> _Live:
+        """See Continuing."""
+        other = _Live(self._settings, route)
+        _go_on(other, self, came_from)
+        return other
 
 
 class _Seen(NamedTuple):
@@ -152,10 +164,11 @@ class _Lagging:
 
     def __init__(self, settings: Bayes, route: Route) -> None:
         learned = checked(route.learned)
+        self._settings = settings
         self._threshold, self._measured = settings._threshold(route, LATE), LATE in learned
         self._lag_us = round(settings.lag_s * 1e6)
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
-        self._reader = Reader(self._filter.ways)
+        self._reader, self._is_part = Reader(self._filter.ways, route.left_out), route.left_out > 0
         self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
         self._waiting: deque[_Seen] = deque()
         self._moments: deque[Moment] = deque()
@@ -163,7 +176,8 @@ class _Lagging:
 
     def step(self, row: Row, seen: Seen) -> list[Answer]:
         """See Following."""
-        z = robust_z(self._check(row[None])[0])
+        row = self._check(row[None])[0]
+        z = np.asarray(row, np.float32) if self._is_part else robust_z(row)
         weight, drive_s = self._clock.see(seen)
         if drive_s is not None:
             self._moments.append(self._filter.moment)
@@ -178,6 +192,18 @@ class _Lagging:
     def finish(self) -> list[Answer]:
         """See Following."""
         return self._answers(len(self._waiting))
+
+    def continued(self, route: Route, came_from: NDArray[np.int64]) -> _Lagging:
+        """See Continuing."""
+        other = _Lagging(self._settings, route)
+        _go_on(other, self, came_from)
+        other._moved = self._moved
+        other._waiting.extend(one._replace(z=taken(one.z, came_from)) for one in self._waiting)
+        other._moments.extend(
+            Moment(taken(one.belief, came_from), taken(one.evidence, came_from), one.moved_s)
+            for one in self._moments
+        )
+        return other
 
     def _answers(self, due: int) -> list[Answer]:
         """The first `due` of those that wait, each judged by all that is known."""
@@ -199,6 +225,13 @@ class _Lagging:
         while self._waiting and self._waiting[0].moment > self._moved - len(self._moments):
             self._moments.popleft()
         return answers
+
+
+def _go_on(now: _Live | _Lagging, before: _Live | _Lagging, came_from: NDArray[np.int64]) -> None:
+    """Take over what does not depend on which items are compared, and the belief."""
+    now._filter.go_on(before._filter, came_from)
+    now._clock, now._means = before._clock, before._means
+    now._check.queries = before._check.queries
 
 
 def _answer(

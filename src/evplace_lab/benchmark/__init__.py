@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from evplace.core import families
 from evplace.core.storage import new_file, write_json
 from evplace.evaluation import Result, sample, versions
-from evplace.evaluation._evaluate import evaluate, judged
+from evplace.evaluation._evaluate import evaluate, hear, judged
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap, train
@@ -174,8 +174,8 @@ def _of_submission(task: Task, method: Submission, matcher: str) -> Result:
         matcher=families.make("matchers", matcher),
     )  # fmt: skip
     where = Localizer(place_map)
-    answered = where.answers(task.query, "live", given.rows)
-    result = judged(where, task.query, answered, task.truth(task.items), "live")
+    heard = hear(where, task.query, [task.truth(task.items)], "live", given.rows)
+    result = judged(where, task.query, heard, 0)
     known = result.settings | {"map": {"scorer": {"name": method.name, "given": given.kind}}}
     result = dataclasses.replace(result, settings=known, took_s=round(time.perf_counter() - began, 3))
     return sample(result, task.query.images, lambda items: np.asarray(task.database.images[items]))

@@ -7,7 +7,6 @@ in `out/runs`, so that a call that was stopped goes on.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from typing import Any
 from evplace.core.errors import SettingsError
 from evplace.core.settings import to_dict
 from evplace.core.storage import locked, new_file, read_json, write_json
-from evplace.core.workers import run_all
+from evplace.core.workers import Workers, run_all, workers_of
 from evplace.evaluation import versions
 from evplace_lab.benchmark import Table
 from evplace_lab.city import CitySettings, Progress, generate
@@ -57,7 +56,7 @@ class Recipe:
 def robustness(
     out: Path,
     kinds: Sequence[str],
-    workers: int | None,
+    workers: int | Workers | None,
     driving: Callable[[Progress], None],
     watch: Callable[[int, int, str], None],
 ) -> dict[str, Any]:
@@ -75,9 +74,10 @@ def robustness(
             done[0] += 1
             watch(done[0], len(jobs), line)
 
-        count = max(1, min(workers or os.cpu_count() or 1, len(jobs)))
-        shares = [{"jobs": jobs[start::count]} for start in range(count)] if jobs else []
-        run_all("evplace_lab.benchmark._robust_worker", shares, count, said)
+        at_work = workers_of(workers)
+        count = min(at_work.count, len(jobs))
+        shares = [{"jobs": jobs[start::count]} for start in range(count)]
+        run_all("evplace_lab.benchmark._robust_worker", shares, at_work, out, said)
         document = {
             "format": FORMAT,
             "rows": [row for recipe in chosen for row in _rows(out, recipe)],

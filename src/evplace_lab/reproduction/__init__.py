@@ -10,7 +10,6 @@ that needs nothing holds `document(out, choice, workers, progress)` in place of 
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -22,7 +21,7 @@ from evplace.core import families
 from evplace.core.errors import InputError, SettingsError
 from evplace.core.settings import to_dict
 from evplace.core.storage import locked, new_file, write_json
-from evplace.core.workers import run_all
+from evplace.core.workers import Workers, run_all, workers_of
 from evplace.evaluation import versions
 from evplace.scorers import require
 from evplace_lab.city import Progress as CityProgress
@@ -73,24 +72,24 @@ def reproduce(
     city: str | Path | None = None,
     data: str | Path | None = None,
     choice: Choice | None = None,
-    workers: int | None = None,
+    workers: int | Workers | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Make a table or figure and write `out/NAME.json`; returns what it holds.
 
     `city` is a folder of `evplace city`; without one, the benchmark is made in `out/city`. `data` is a folder
-    of real sets, which the table `real` is made of. `workers` processes are used (None: one a core); they do
-    not change the result. Raises SettingsError for an unknown name, InputError where a drive is lacking,
-    OutputError where another process writes `out`.
+    of real sets, which the table `real` is made of. `workers` is how many processes are used (None: one a
+    core), or where; they do not change the result. Raises SettingsError for an unknown name, InputError where
+    a drive is lacking, OutputError where another process writes `out`.
     """
     folder, chosen = Path(out), choice or Choice()
     family = families.load("reproduction", name)
-    count = (os.cpu_count() or 1) if workers is None else workers
-    _check(name, family, chosen, count)
+    used = workers_of(workers)
+    _check(name, family, chosen)
     began = time.monotonic()
     if family.NEEDS == "nothing":
         with locked(folder / "reproduce"):
-            return _kept(folder / f"{name}.json", family.document(folder, chosen, count, progress), began)
+            return _kept(folder / f"{name}.json", family.document(folder, chosen, used, progress), began)
     drives = _real_sets(data) if family.NEEDS == "data" else _city(city, folder, data)
     cases = family.cases(drives, chosen)
     for case in cases:
@@ -100,10 +99,10 @@ def reproduce(
         drives.check(cases)
     with locked(folder / "reproduce"):
         if city is None and isinstance(drives, Cities):
-            generate(drives.city, workers=count, progress=_of_city(progress))
+            generate(drives.city, workers=used, progress=_of_city(progress))
         runs = Runs(folder, drives.source)
         cases = runs.distinct(cases)
-        _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, count, progress)
+        _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, used, progress)
         document: dict[str, Any] = family.collect(drives, runs, chosen)
         document |= {
             "settings": {"drives": drives.settings, "seeds": chosen.seeds, "train": chosen.train}
@@ -121,10 +120,8 @@ def _kept(file: Path, document: dict[str, Any], began: float) -> dict[str, Any]:
     return document
 
 
-def _check(name: str, family: ModuleType, choice: Choice, workers: int) -> None:
+def _check(name: str, family: ModuleType, choice: Choice) -> None:
     """SettingsError for a choice that this table cannot make."""
-    if workers < 1:
-        raise SettingsError(f"{workers} processes can do nothing: take at least 1")
     if choice.methods and not family.METHODS:
         raise SettingsError(f"{name} changes the paper's own methods: no others can stand in it")
     for one in choice.methods:
@@ -159,7 +156,7 @@ def _real_sets(data: str | Path | None) -> RealSets:
 
 
 def _answer(
-    cases: list[Case], total: int, drives: Drives, runs: Runs, workers: int, progress: Progress | None
+    cases: list[Case], total: int, drives: Drives, runs: Runs, workers: Workers, progress: Progress | None
 ) -> None:
     """Run all `cases` in processes; those that share a map stand together."""
     if not cases:
@@ -171,7 +168,7 @@ def _answer(
     # What is trained comes first: the longest work last would leave a core idle. Each process gets its share
     # at once, for starting one takes seconds.
     ordered = sorted(groups.values(), key=lambda group: group[0].train is None)
-    count = min(workers, len(ordered))
+    count = min(workers.count, len(ordered))
     shares = [[sorted(group, key=_shared) for group in ordered[start::count]] for start in range(count)]
     jobs = [
         {
@@ -187,7 +184,7 @@ def _answer(
         if progress is not None:
             progress(finished[0], total, line)
 
-    run_all("evplace_lab.reproduction._worker", jobs, count, said)
+    run_all("evplace_lab.reproduction._worker", jobs, workers, runs.out, said)
 
 
 def _shared(case: Case) -> tuple[str, str, str]:

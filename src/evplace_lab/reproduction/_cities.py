@@ -13,6 +13,7 @@ from evplace.core.events import Events
 from evplace.core.folders import instead
 from evplace.core.settings import make
 from evplace.core.storage import new_folder, read_json
+from evplace.core.workers import Workers
 from evplace.evaluation._evaluate import Rule, truth_of
 from evplace.evaluation.truth import Truth
 from evplace.imaging.images import Imager, ImageSettings
@@ -91,7 +92,7 @@ class Cities:
                         "a new folder: evplace city -o FOLDER"
                     )
 
-    def prepare(self, cases: list[Case], workers: int) -> None:
+    def prepare(self, cases: list[Case], workers: Workers) -> None:
         """Make the drives and images that the benchmark does not have and some case needs."""
         if any(case.exposure == "auto" for case in cases):
             exposed = self._like(sensors=(), most_gain=EXPOSED_GAIN, keep_events=False)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from evplace.core.errors import EvaluationError
+from evplace.core.workers import Workers
 from evplace.drives import datasets
 from evplace.drives.to_traverse import open_traverse
 from evplace.evaluation._evaluate import truth_of
@@ -73,7 +74,7 @@ class Panels(Cities):
         """InputError where the city lacks what some case needs; only real sets that are there have cases."""
         super().check([case for case in cases if not _is_real(case.query)])
 
-    def prepare(self, cases: list[Case], workers: int) -> None:
+    def prepare(self, cases: list[Case], workers: Workers) -> None:
         """Make what is not there: the city's drives, and traverses of real sets."""
         super().prepare([case for case in cases if not _is_real(case.query)], workers)
         for case in cases:

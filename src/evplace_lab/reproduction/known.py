@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
+from evplace.core.workers import Workers
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.matchers import _traces as traces
@@ -95,7 +96,7 @@ class Own:
 
 
 def document(
-    out: Path, choice: Choice, workers: int, progress: Callable[[int, int, str], None] | None
+    out: Path, choice: Choice, workers: Workers, progress: Callable[[int, int, str], None] | None
 ) -> dict[str, Any]:
     """Make the drives that are missing, fit, and judge; SettingsError for settings of a training."""
     if choice.train:

@@ -13,6 +13,7 @@ import pytest
 
 from conftest import Drive
 from evplace.core.errors import SettingsError
+from evplace.core.workers import Workers
 from evplace.imaging.traverse import Traverse
 from evplace_lab.benchmark import _disturbances, robustness
 from evplace_lab.benchmark._disturbances import MAPS, QUERIES, Night
@@ -110,8 +111,9 @@ def test_a_stopped_call_goes_on_and_the_page_shows_all(
 ) -> None:
     ran: list[str] = []
 
-    def run_all(module: str, jobs: Any, count: int, report: Any) -> None:
-        assert (module, count) == ("evplace_lab.benchmark._robust_worker", len(jobs) or 1)
+    def run_all(module: str, jobs: Any, workers: Workers, out: Path, report: Any) -> None:
+        assert (module, out) == ("evplace_lab.benchmark._robust_worker", tmp_path)
+        assert len(jobs) <= workers.count
         for job in (job for share in jobs for job in share["jobs"]):
             ran.append(job["kind"])
             Path(job["file"]).parent.mkdir(exist_ok=True)

@@ -9,7 +9,8 @@ To add a format, add one file and its test. The file holds:
   None), the guesses made (`notes`), the names of the streams of events in it (the one that is read first; see
   `ordered`), and `blocks()`, which starts at the beginning and gives the decoded events in bounded memory.
   `read` raises RecordingError where the header cannot be used, UnsupportedError where it names what is not
-  read, `blocks()` raises DamagedRecordingError where the data breaks off, after every good block;
+  read, `blocks()` raises DamagedRecordingError where the data breaks off, after every good block; of a large
+  file it is called, and its blocks are made, in a thread of their own;
 - `TABLE = True` where events stand in columns, so that `hints.columns` has a meaning.
 
 The reader only decodes. `Recording` checks coordinates and times, counts what it drops, infers a missing
