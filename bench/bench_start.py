@@ -2,7 +2,7 @@
 
     python bench/bench_start.py RECORDING [MAP QUERY]
 
-`evplace info RECORDING` (a small one), `evplace localize MAP QUERY` (of two seconds), and both with an empty cache
+`evplace info RECORDING` (small), `evplace localize MAP QUERY` (of two seconds), and both with an empty cache
 of compiled loops, as for the first time after an installation. Python's own start and imports are to compare.
 """
 

@@ -21,10 +21,13 @@ from numpy.typing import NDArray
 
 from best import truth_of
 from evplace import Localizer, PlaceGrid, PlaceMap, Traverse, train
+from evplace.imaging.averaging import Averager
 from evplace.placemap import add, named, parts_of
 from evplace.placemap._parts import JoinedRows
+from evplace.scorers import opened_together
 from evplace.scorers.fused import Fused
 
+LARGER = "day-1, all images"
 STRETCH, DRAWS = 100, 2000
 """Images that are drawn together, ten seconds; and how often."""
 
@@ -46,12 +49,12 @@ def map_of(drive: Traverse, name: str, **settings: float) -> PlaceMap:
     return named(train(drive, PlaceGrid.from_track(drive.track), Fused(**settings)), name)  # type: ignore[arg-type]
 
 
-def maps(drives: dict[str, Traverse]) -> Iterator[tuple[str, PlaceMap]]:
+def maps(drives: dict[str, Traverse], alone: dict[str, PlaceMap]) -> Iterator[tuple[str, PlaceMap]]:
     """Day alone, larger, and with others."""
     first, *others = drives
-    day = map_of(drives[first], first)
+    day = alone[first]
     yield first, day
-    yield f"{first}, all images", map_of(drives[first], first, every_m=0.4)
+    yield LARGER, alone[LARGER]
     for name in others:
         yield f"{first} + {name}", add(day, drives[name], names=[name])
     if len(others) > 1:
@@ -61,24 +64,35 @@ def maps(drives: dict[str, Traverse]) -> Iterator[tuple[str, PlaceMap]]:
 
 
 class Scored:
-    """The rows of queries on the map of each drive, made once."""
+    """The rows of queries on the whole map of each drive, made once: each image is described once."""
 
-    def __init__(self) -> None:
-        self._rows: dict[tuple[str, str, int], NDArray[np.float32]] = {}
+    def __init__(self, alone: dict[str, PlaceMap]) -> None:
+        self._alone = alone
+        whole = [dataclasses.replace(one.parts[0].map, parts=()) for one in alone.values()]
+        self._scoring = opened_together(whole[0].scorer, [one.content for one in whole])
+        self._rows: dict[str, dict[str, NDArray[np.float32]]] = {}
 
     def rows(self, place_map: PlaceMap, query: Traverse, name: str) -> NDArray[np.float32]:
-        """(queries, items)."""
-        parts = parts_of(place_map)
-        found = [self._of(part.map, query, (part.name, name, len(part.map.items))) for part in parts]
+        """(queries, items) of a map of some of these drives."""
+        if name not in self._rows:
+            self._rows[name] = self._scored(query)
+        kept = [
+            self._rows[name][part.name][:, np.isin(self._alone[part.name].items.t_us, part.map.items.t_us)]
+            for part in parts_of(place_map)
+        ]
         joined = place_map.scoring()
         assert isinstance(joined, JoinedRows)
-        return joined.best(np.concatenate(found, axis=1))
+        return joined.best(np.concatenate(kept, axis=1))
 
-    def _of(self, one: PlaceMap, query: Traverse, key: tuple[str, str, int]) -> NDArray[np.float32]:
-        if key not in self._rows:
-            alone = dataclasses.replace(one, parts=())
-            self._rows[key] = Localizer(alone).seen_of(query)[1]
-        return self._rows[key]
+    def _scored(self, query: Traverse) -> dict[str, NDArray[np.float32]]:
+        """(queries, references) on the map of each drive."""
+        averager = Averager(Fused().averaging)
+        found: list[list[NDArray[np.float32]]] = [[] for _ in self._scoring]
+        for image, t_us in zip(query.images, query.t_us, strict=True):
+            mean = averager.push(np.asarray(image), int(t_us))[None]
+            for rows, one in zip(found, self._scoring, strict=True):
+                rows.append(one.rows(mean)[0])
+        return {name: np.stack(rows) for name, rows in zip(self._alone, found, strict=True)}
 
 
 def judged(place_map: PlaceMap, query: Traverse, rows: NDArray[np.float32]) -> Judged:
@@ -117,10 +131,11 @@ def main() -> None:
         places = {name: [one / name / sensor for one in (args.city, args.more) if one] for name in wanted}
         found = {name: next((one for one in ones if one.exists()), None) for name, ones in places.items()}
         drives = {name: Traverse.load(one) for name, one in found.items() if one is not None}
-        scored, first = Scored(), dict[str, Judged]()
-        for title, place_map in maps(
-            {name: drives[name] for name in ["day-1", *args.drives] if name in drives}
-        ):
+        known = {name: drives[name] for name in ["day-1", *args.drives] if name in drives}
+        alone = {name: map_of(drive, name) for name, drive in known.items()}
+        alone[LARGER] = map_of(drives["day-1"], LARGER, every_m=0.4)
+        scored, first = Scored(alone), dict[str, Judged]()
+        for title, place_map in maps(known, alone):
             inside = {part.name for part in parts_of(place_map)}
             references = sum(len(part.item) for part in parts_of(place_map))
             for name in (name for name in args.queries if name in drives and name not in inside):

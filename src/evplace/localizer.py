@@ -137,6 +137,8 @@ class Localizer:
         """Forget the drive so far."""
         with families.blaming("matchers", self.matcher):
             self._following = InParts(self.matcher, self._route, self._distances)
+            if self._near[0] is None:
+                self._following.within(None)  # what is wrong with the map is said now
         self._regions = Regions(self.map, *self._near)
         self._stepped = 0
         self.image: NDArray[np.uint8] | None = None

@@ -84,7 +84,7 @@ def test_a_recording_is_added_as_the_map_was_made(drives: Path, tmp_path: Path, 
         (("add", "{map}", "{dusk}", "--drives", "x"), "--drives means nothing"),
         (("add", "{map}", "{dusk}", "{dusk}", "--name", "x"), "--name is of one drive, and 2 are given"),
         (("add", "{map}", "{dusk}", "-o", "{map}"), "exists"),
-        (("add", "{dusk}", "{dusk}"), "is no map"),
+        (("add", "{dusk}", "{dusk}"), "is a traverse, not a map"),
         (("add", "{map}", "{day}"), "already, as 'first'"),
     ],
 )
@@ -100,4 +100,5 @@ def test_flags_of_one_drive_are_refused_for_several(drives: Path, tmp_path: Path
     days = (drives / "day", drives / "dusk")
     told = fault(capsys, "train", *days, "--track", drives / "late.csv", "-o", tmp_path / "map")
     assert "--track is of one drive, and 2 are given" in told
+    assert "learns places" in fault(capsys, "train", *days, "--preset", "paper", "-o", tmp_path / "map")
     assert not (tmp_path / "map").exists()

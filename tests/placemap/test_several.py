@@ -17,6 +17,7 @@ from evplace.matchers.bayes import Bayes
 from evplace.placemap import PlaceMap, add, calibrate, merge, named, parts_of, split, train, versions_of
 from evplace.placemap._parts import OVERLAP_M
 from evplace.places import PlaceGrid, PlaceRuns
+from evplace.scorers import ComparesSome
 from evplace.sources.tracks import Track
 
 
@@ -70,6 +71,15 @@ def test_an_item_scores_as_the_best_of_its_references(one: PlaceMap, two: PlaceM
     for item, column in zip(added.item, alone.T, strict=True):
         expected[:, item] = np.maximum(expected[:, item], column)
     np.testing.assert_array_equal(Localizer(two).rows(dusk.images[:9]), expected)
+
+
+@pytest.mark.parametrize("scorer", ["edges", "sad"])
+def test_some_items_score_as_in_a_whole_row(scorer: str, bright: Traverse, dusk: Traverse) -> None:
+    joined = add(train(bright, grid(bright), scorer, matcher="best"), moved(dusk, east=100.0))
+    where, items = joined.scoring(), np.array([150, 3, 70, 119])
+    assert isinstance(where, ComparesSome)
+    whole = where.rows(dusk.images[:5])[:, items]
+    np.testing.assert_allclose(where.some(dusk.images[:5], items), whole, atol=1e-5)
 
 
 def slow_street(seed: int, noise: float = 0.02) -> Traverse:

@@ -19,6 +19,7 @@ PIP = r"pip install 'evplace\[train\]'"
 
 @pytest.fixture
 def no_torch(monkeypatch: pytest.MonkeyPatch) -> None:
+    main(["list", "scorers", "--json"])  # when it first reads flags, tyro imports what sys.modules names
     monkeypatch.setitem(sys.modules, "torch", None)
 
 
@@ -45,7 +46,7 @@ def test_demo_and_tables_say_so_before_the_city_is_made(
 def test_a_wrong_name_is_told_before_the_map_is_learned(
     day: Traverse, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("evplace.placemap._training._learned", lambda *_: pytest.fail("it has learned"))
+    monkeypatch.setattr("evplace.placemap._training.learned_map", lambda *_: pytest.fail("it has learned"))
     assert day.track is not None
     places = PlaceGrid.from_track(day.track)
     with pytest.raises(SettingsError, match="'nonsense' is none of the scorers"):

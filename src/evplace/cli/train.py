@@ -149,7 +149,12 @@ def _opened(args: Args, source: Path) -> Traverse:
 
 
 def _check_several(args: Args) -> None:
-    """SettingsError where something is given that belongs to one drive."""
+    """SettingsError where something is given that belongs to one drive, or that learns all at once."""
+    if (args.scorer or default_scorer(args.preset)) == "network":
+        raise SettingsError(
+            "the scorer 'network' learns places, all at once and from one drive: take one whose items are "
+            "images, such as fused, or give one drive"
+        )
     own = [name for name in ("track", "mask", "drive") if getattr(args, name) is not None]
     if own:
         raise SettingsError(

@@ -190,8 +190,11 @@ def _nearest_right(block: Bools, here: Floats | None, there: Floats | None) -> N
         place = np.cumsum(block, axis=1)
         nearest = np.argmax(place > (place[:, -1:] - 1) // 2, axis=1)
     else:
-        apart = np.hypot(here[:, 0, None] - there[:, 0], here[:, 1, None] - there[:, 1])
-        nearest = np.argmin(np.where(block & np.isfinite(apart), apart, np.inf), axis=1)
+        apart = np.full(block.shape, np.inf)
+        query, item = np.nonzero(block)  # few: the distances to all others are not needed
+        metres = np.hypot(*(here[query] - there[item]).T)
+        apart[query, item] = np.where(np.isfinite(metres), metres, np.inf)
+        nearest = np.argmin(apart, axis=1)
     return np.where(block.any(axis=1), nearest, -1)
 
 

@@ -18,7 +18,7 @@ from evplace.matchers import Learned, Route, Rows, Seen
 from evplace.matchers import _surroundings as around
 from evplace.matchers import _traces as traces
 from evplace.matchers._belief import CONTENT, WRONG
-from evplace.matchers._known import of_drive, probability
+from evplace.matchers._known import of_late, of_live, probability
 from evplace.matchers._ways import Ways
 
 Floats = NDArray[np.float64]
@@ -132,8 +132,8 @@ def _trial(
     unknown = np.array([not _near(whole, keep, item) for item in at])
     live, late = traces.live(part, rows, seen, learned), traces.late(part, rows, seen, learned)
     return (
-        of_drive(live.signs, live.weight, late=False)[unknown],
-        of_drive(late.signs, late.weight, late=True)[unknown],
+        of_live(live.signs, live.weight)[unknown],
+        of_late(late.signs, late.live, late.weight)[unknown],
     )
 
 

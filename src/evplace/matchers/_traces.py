@@ -46,6 +46,8 @@ class Trace(NamedTuple):
     """(queries,) the answers."""
     signs: Floats
     """(queries, SIGNS) see `_known`."""
+    live: Floats
+    """(queries, SIGNS) those of what is said live."""
     weight: Floats
     """(queries,) how much each image counts."""
 
@@ -53,7 +55,8 @@ class Trace(NamedTuple):
 def live(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
     """Each answer from the images up to it; `learned` is what the map has told."""
     filter_, reader, clock = Filter(ways, learned.get(WRONG)), Reader(ways), clock_of(learned)
-    out = Trace(np.zeros(len(rows), np.int64), np.zeros((len(rows), SIGNS)), np.zeros(len(rows)))
+    signs = np.zeros((len(rows), SIGNS))
+    out = Trace(np.zeros(len(rows), np.int64), signs, signs, np.zeros(len(rows)))
     for query, (row, one) in enumerate(zip(rows, seen, strict=True)):
         z = robust_z(row)
         out.weight[query], driven_s = clock.see(one)
@@ -67,12 +70,13 @@ def live(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trac
 def late(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
     """Each answer from all images of the drive."""
     drive, wrong = _Drive(seen, clock_of(learned)), learned.get(WRONG)
-    out = Trace(np.zeros(len(rows), np.int64), np.zeros((len(rows), SIGNS)), drive.weight)
+    signs, said = (np.zeros((len(rows), SIGNS)) for _ in range(2))
+    out = Trace(np.zeros(len(rows), np.int64), signs, said, drive.weight)
     starts = _beliefs_at_blocks(ways, rows, drive, wrong)
     reader, message = Reader(ways), None
     for block, start in zip(range(len(starts), -1, -1), chain(starts.backwards(), [None]), strict=True):
         numbers = range(block * BLOCK, min((block + 1) * BLOCK, len(drive.begins)))
-        moments = _moments(ways, rows, drive, wrong, numbers, start)
+        moments = _moments(ways, rows, drive, wrong, numbers, start, said)
         beliefs, message = smoothed(moments, ways, message)
         for number, belief in zip(numbers, beliefs, strict=True):
             for query in range(drive.begins[number], drive.ends[number]):
@@ -98,15 +102,19 @@ def _moments(
     wrong: Floats | None,
     numbers: range,
     start: NDArray[np.floating[Any]] | None,
+    said: Floats | None = None,
 ) -> list[Moment]:
-    """The moments of some numbers, from the belief before them."""
-    filter_, out = Filter(ways, wrong), []
+    """The moments of some numbers, from the belief before them; `said` gets the signs of live answers."""
+    filter_, reader, out = Filter(ways, wrong), Reader(ways), []
     if start is not None:
         filter_.belief = start.astype(np.float64)
     for number in numbers:
         if number:
             filter_.move(drive.driven_s[number])
         for query in range(drive.begins[number], drive.ends[number]):
-            filter_.see(robust_z(rows[query]), drive.weight[query])
+            z = robust_z(rows[query])
+            belief = filter_.see(z, drive.weight[query])
+            if said is not None:
+                said[query] = reader.find(belief, z).signs
         out.append(filter_.moment)
     return out

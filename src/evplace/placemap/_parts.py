@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.scorers import OpenScorer, Rows
+from evplace.scorers import ComparesSome, OpenScorer, Rows
 
 if TYPE_CHECKING:
     from evplace.placemap import Items, PlaceMap
@@ -45,16 +45,14 @@ class Part(NamedTuple):
 
 
 class JoinedRows:
-    """Rows of a map of several drives, from those of the maps of each; see OpenScorer."""
+    """Rows of a map of several drives, from those of the maps of each; see OpenScorer and ComparesSome."""
 
     def __init__(self, opened: Sequence[OpenScorer], items: Sequence[Ints]) -> None:
         """`items` are those that the references of each drive belong to."""
         self.distances = opened[0].distances
-        self._opened = opened
-        item = np.concatenate(items)
-        self._order = np.argsort(item, kind="stable")
-        self._first = np.flatnonzero(np.diff(item[self._order], prepend=-1))
-        self.items = item[self._order][self._first]
+        self._opened, self._belong = opened, items
+        self._all = _Grouped.of(np.concatenate(items))
+        self.items = self._all.items
         """Those that have references, in ascending order: what the columns of a row are."""
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
@@ -67,7 +65,42 @@ class JoinedRows:
 
     def best(self, rows: Rows) -> Rows:
         """(n, references) -> (n, items)."""
-        return np.asarray(np.maximum.reduceat(rows[:, self._order], self._first, axis=1), np.float32)
+        return self._all.best(rows)
+
+    def some(self, images: NDArray[np.uint8], items: Ints) -> Rows:
+        """(n, len(items)) what `rows` would give for these items."""
+        chosen = [np.flatnonzero(np.isin(belong, items)) for belong in self._belong]
+        pairs = list(zip(self._opened, chosen, strict=True))
+        rows = np.concatenate([_some(one, images, some) for one, some in pairs if len(some)], axis=1)
+        found = _Grouped.of(
+            np.concatenate([belong[some] for belong, some in zip(self._belong, chosen, strict=True)])
+        )
+        return found.best(rows)[:, np.searchsorted(found.items, items)]
+
+
+class _Grouped(NamedTuple):
+    """References put together by the items that they belong to."""
+
+    items: Ints
+    order: Ints
+    """(references,) those of the first item first."""
+    first: Ints
+    """(items,) where those of each begin."""
+
+    @classmethod
+    def of(cls, belong: Ints) -> _Grouped:
+        """From the item (references,) of each."""
+        order = np.argsort(belong, kind="stable")
+        first = np.flatnonzero(np.diff(belong[order], prepend=-1))
+        return cls(belong[order][first], order, first)
+
+    def best(self, rows: Rows) -> Rows:
+        """(n, references) -> (n, items)."""
+        return np.asarray(np.maximum.reduceat(rows[:, self.order], self.first, axis=1), np.float32)
+
+
+def _some(one: OpenScorer, images: NDArray[np.uint8], references: Ints) -> Rows:
+    return one.some(images, references) if isinstance(one, ComparesSome) else one.rows(images)[:, references]
 
 
 def places_in(known: Items, new: Items) -> tuple[Ints, Ints]:

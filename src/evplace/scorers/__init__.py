@@ -107,8 +107,8 @@ class OfParts(Protocol):
 class Thins(Protocol):
     """A Scorer that can do without some references."""
 
-    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content:
-        """What is left of a content that was learned, with these of its items."""
+    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content | None:
+        """What is left of a content that was learned, with these of its items; None where it stays whole."""
 
 
 class Remembering:

@@ -99,8 +99,10 @@ class Fused:
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
 
-    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content:
-        """See Thins."""
+    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content | None:
+        """See Thins: an index stays whole."""
+        if ABOUT in content:
+            return None
         of_items = {REFERENCES, *(f"{name}_vectors" for name in self.parts)}
         return {
             name: value[items] if name in of_items and isinstance(value, np.ndarray) else value

@@ -109,7 +109,11 @@ class Recording:
     @property
     def _is_large(self) -> bool:
         """Whether it is decoded ahead; marking on a canvas goes hand in hand with the canvas's windows."""
-        return not self._source.apart and (self.path.is_dir() or self.path.stat().st_size >= LARGE)
+        try:
+            size = LARGE if self.path.is_dir() else self.path.stat().st_size
+        except OSError:  # it comes from elsewhere, or has gone: its blocks will say so
+            return False
+        return not self._source.apart and size >= LARGE
 
     def _judge(self, fault: RecordingError | None) -> None:
         """Raise what ended the reading, else what speaks against it."""
