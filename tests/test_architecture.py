@@ -23,8 +23,8 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places searchers scorers matchers placemap _regions localizer serving evaluation "
-        "doctor testing cli"
+        "core sources imaging drives places searchers scorers matchers placemap _regions localizer serving "
+        "evaluation doctor testing cli"
     ),
     "evplace.core": "errors events grey zscores settings families storage workers drawing",
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",

@@ -80,7 +80,8 @@ def test_train_localize_evaluate_compare(files: Path, street: Path, tmp_path: Pa
     assert main(["localize", str(street), f"{files}/night.aedat4", "--matcher", "best", "-o", str(csv)]) == 0
     lines = csv.read_text().splitlines()
     assert lines[0] == (
-        "t_us,place,easting,northing,score,state,latitude,longitude,heading_deg,probability,uncertainty_m"
+        "t_us,place,easting,northing,score,state,latitude,longitude,heading_deg,probability,uncertainty_m,"
+        "compared"
     )
     assert abs(float(lines[1].split(",")[6])) < 90
     assert len(lines) == 61

@@ -68,6 +68,9 @@ class Args(MatcherFlags, TrackFlags, DriveFlags):
     near_m: float | None = None
     """Compare only with references within so many metres of where --track says that the drive is, or without
     one, of the last match; with all of them where neither is known."""
+    unchecked: bool = False
+    """Do not hold the map against its checksums: those of a very large one, which is mapped into memory, take
+    a while."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -124,8 +127,8 @@ class _Drive:
 def run(args: Args) -> int:
     """Localise and print, or write, the matches."""
     where = Localizer(
-        PlaceMap.load(args.map), args.matcher, args.preset, args.mask, args.near_m, args.opened_track(),
-        **args.matcher_settings(),
+        PlaceMap.load(args.map, unchecked=args.unchecked), args.matcher, args.preset, args.mask, args.near_m,
+        args.opened_track(), **args.matcher_settings(),
     )  # fmt: skip
     if args.watch:
         return _watched(where, args)

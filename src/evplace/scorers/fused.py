@@ -101,11 +101,19 @@ class Fused:
 
     def open(self, content: Content) -> OpenScorer:
         """See Scorer."""
-        items = len(references_of(content))
+        references = references_of(content)
+        items = len(references)
         _check_versions(content, _versions(self))
-        if ABOUT in content:
-            return IndexedRows(self.parts, WEIGHTS, content, items)
-        return _FusedRows([(name, part, _read(content, name, items)) for name, part in self.parts.items()])
+        opened: IndexedRows | _FusedRows = (
+            IndexedRows(self.parts, WEIGHTS, content, items)
+            if ABOUT in content
+            else _FusedRows([(name, part, _read(content, name, items)) for name, part in self.parts.items()])
+        )
+        try:
+            opened.some(np.asarray(references[:1]), np.zeros(1, np.int64))
+        except ValueError as error:  # of numpy, whose products fit no other numbers
+            raise PlaceMapError("the map's vectors do not fit its images: train it again") from error
+        return opened
 
 
 Fused.presets = {"best": Fused()}
