@@ -62,6 +62,9 @@ class Args(MatcherFlags, TrackFlags, DriveFlags):
     near_m: float | None = None
     """Compare only with references within so many metres of where --track says that the drive is, or without
     one, of the last match; with all of them where neither is known."""
+    unchecked: bool = False
+    """Do not hold the map against its checksums: those of a very large one, which is mapped into memory, take
+    a while."""
     overwrite: bool = False
     """Replace what exists."""
     json: bool = False
@@ -126,7 +129,7 @@ def run(args: Args) -> int:
         raise SettingsError(f"`json` and `format={args.format}` ask for two formats: give one")
     if args.out is not None:
         check_new_file(args.out, args.overwrite)
-    place_map = PlaceMap.load(args.map)
+    place_map = PlaceMap.load(args.map, unchecked=args.unchecked)
     form = format_of(args.out, "json" if args.json else args.format, place_map)
     where = Localizer(
         place_map, args.matcher, args.preset, args.mask, args.near_m, args.opened_track(),

@@ -249,9 +249,12 @@ class PlaceMap:
         path: str | Path,
         scorer: Scorer | Descriptor | None = None,
         matcher: Matcher | None = None,
+        unchecked: bool = False,
     ) -> PlaceMap:
         """The map in the folder `path`; PlaceMapError where it is none, or a byte of it has changed.
 
+        What its scorer has learned is mapped into memory, so that it may be larger than that. Its checksums
+        take reading all of it once: `unchecked` leaves them out, and then a changed byte may not be found.
         `scorer` and `matcher` open a map whose parts no installed package offers: the objects that it was
         trained with.
         """
@@ -262,7 +265,8 @@ class PlaceMap:
             raise PlaceMapError(instead(folder, MARK) or made)
         try:
             about = about_of(folder, what)
-            check_sums(folder, what, files_of(about))
+            if not unchecked:
+                check_sums(folder, what, files_of(about))
             place_map = cls(
                 scorer=_part_from("scorers", about["scorer"], what) if scorer is None else scorer,
                 places=places_of.from_dict(about["places"]),

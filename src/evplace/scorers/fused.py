@@ -111,12 +111,20 @@ class Fused:
 
     def open(self, content: Content, parts: Mapping[str, Descriptor] | None = None) -> OpenScorer:
         """See OfParts."""
-        items = len(references_of(content))
+        references = references_of(content)
+        items = len(references)
         _check_versions(content, _versions(self))
         used = parts or self.parts
-        if ABOUT in content:
-            return IndexedRows(used, WEIGHTS, content, items)
-        return _FusedRows([(name, part, _read(content, name, items)) for name, part in used.items()])
+        opened: IndexedRows | _FusedRows = (
+            IndexedRows(used, WEIGHTS, content, items)
+            if ABOUT in content
+            else _FusedRows([(name, part, _read(content, name, items)) for name, part in used.items()])
+        )
+        try:
+            opened.some(np.asarray(references[:1]), np.zeros(1, np.int64))
+        except ValueError as error:  # of numpy, whose products fit no other numbers
+            raise PlaceMapError("the map's vectors do not fit its images: train it again") from error
+        return opened
 
 
 Fused.presets = {"best": Fused()}
