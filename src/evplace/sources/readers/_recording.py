@@ -98,7 +98,7 @@ class Recording:
     def _blocks(self, canvas: Canvas | None) -> Iterator[Block]:
         """Decoded blocks; what was marked before the events of each is counted."""
         if canvas is None or self._source.onto is None:
-            yield from ahead(self._source.blocks) if self._is_large else self._source.blocks()
+            yield from ahead(self._source.blocks) if self._goes_ahead else self._source.blocks()
             return
         canvas.close()
         for block in self._source.onto(canvas):
@@ -107,13 +107,16 @@ class Recording:
             yield block
 
     @property
-    def _is_large(self) -> bool:
-        """Whether it is decoded ahead; marking on a canvas goes hand in hand with the canvas's windows."""
+    def _goes_ahead(self) -> bool:
+        """Whether it is decoded ahead.
+
+        Readers that can mark on a canvas do not take long enough: the thread would cost more than they do.
+        """
         try:
             size = LARGE if self.path.is_dir() else self.path.stat().st_size
         except OSError:  # it comes from elsewhere, or has gone: its blocks will say so
             return False
-        return not self._source.apart and size >= LARGE
+        return self._source.onto is None and not self._source.apart and size >= LARGE
 
     def _judge(self, fault: RecordingError | None) -> None:
         """Raise what ended the reading, else what speaks against it."""
