@@ -18,7 +18,7 @@ from evplace.core import families
 
 Family = Literal[
     "readers", "live", "writers", "tracks", "datasets", "representations", "searchers", "scorers", "matchers",
-    "doctor",
+    "exports", "doctor",
 ]  # fmt: skip
 
 

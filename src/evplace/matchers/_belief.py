@@ -109,7 +109,7 @@ def moved(belief: Floats, ways: Ways, seconds: float, other: Floats) -> Floats:
     """(references, speeds) a belief after so many seconds of driving: it is `other`; `belief` is used up."""
     ticks = min(seconds / TICK_S, 1.0)
     loops.mix_speeds(belief, CHANGE * ticks, other)
-    loops.move(other, ways.way, SPEEDS * ways.pace * seconds, belief)
+    loops.move(other, ways.way, SPEEDS * ways.pace * seconds, belief, np.empty(len(SPEEDS), np.uint64))
     loops.pass_links(belief, *ways.links, LINK * ticks, other)
     kept = other.sum() * (1 - JUMP * ticks)
     loops.level(other, 1 - JUMP * ticks, (1 - kept) / other.size)

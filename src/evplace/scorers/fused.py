@@ -99,15 +99,25 @@ class Fused:
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
 
-    def open(self, content: Content) -> OpenScorer:
-        """See Scorer."""
+    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content | None:
+        """See Thins: an index stays whole."""
+        if ABOUT in content:
+            return None
+        of_items = {REFERENCES, *(f"{name}_vectors" for name in self.parts)}
+        return {
+            name: value[items] if name in of_items and isinstance(value, np.ndarray) else value
+            for name, value in content.items()
+        }
+
+    def open(self, content: Content, parts: Mapping[str, Descriptor] | None = None) -> OpenScorer:
+        """See OfParts."""
         references = references_of(content)
-        items = len(references)
+        items, used = len(references), parts or self.parts
         _check_versions(content, _versions(self))
         opened: IndexedRows | _FusedRows = (
-            IndexedRows(self.parts, WEIGHTS, content, items)
+            IndexedRows(used, WEIGHTS, content, items)
             if ABOUT in content
-            else _FusedRows([(name, part, _read(content, name, items)) for name, part in self.parts.items()])
+            else _FusedRows([(name, part, _read(content, name, items)) for name, part in used.items()])
         )
         try:
             opened.some(np.asarray(references[:1]), np.zeros(1, np.int64))
