@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
+from evplace.cli import main
 from evplace.core.events import Events
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.stream import event_images
@@ -128,7 +129,9 @@ def image_map(day: Traverse, places: PlaceGrid) -> PlaceMap:
 def sum_again(folder: Path) -> None:
     """Make the sums of a map anew, over all files that lie there."""
     files = sorted(file for file in folder.iterdir() if file.is_file() and file.name != "SHA256SUMS")
-    lines = [f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in files]
+    files += sorted(folder.glob("drives/*/SHA256SUMS"))
+    sums = {file.relative_to(folder): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+    lines = [f"{checksum}  {file.as_posix()}\n" for file, checksum in sums.items()]
     (folder / "SHA256SUMS").write_text("".join(lines))
 
 
@@ -137,3 +140,20 @@ def network_map(day: Traverse, places: PlaceGrid) -> PlaceMap:
     """A map with a network that was trained for a moment."""
     pytest.importorskip("torch", reason="the network needs the extra 'train'")
     return train(day, places, "network", steps=120, batch=16)
+
+
+@pytest.fixture(scope="session")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """day.aedat4, night.aedat4 and their logs, day.csv and night.csv."""
+    folder = tmp_path_factory.mktemp("files")
+    write_drive(folder, "day", make_drive())
+    write_drive(folder, "night", make_drive(seed=1, noise=0.02))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def street(files: Path) -> Path:
+    """A map of the day's images."""
+    arguments = ["train", f"{files}/day.aedat4", "--track", f"{files}/day.csv", "-o", f"{files}/street.evp"]
+    assert main([*arguments, "--scorer", "ncc"]) == 0
+    return files / "street.evp"

@@ -22,7 +22,7 @@ from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.matchers.best import Best
-from evplace.placemap import PlaceMap, train
+from evplace.placemap import PlaceMap, add, train
 from evplace.places import PlaceGrid, PlaceRuns
 from evplace.scorers.network import Network
 from evplace.sources.tracks import Track
@@ -102,6 +102,9 @@ def saved_as(name: str, folder: Path, query: Traverse) -> tuple[Callable[[Path],
         evaluate(Localizer(train(drive(0), grid(), "ncc"), Best()), query).save(folder, with_scores=True)
         return result_used, "result.json"
     places: Any = PlaceRuns(12, 3) if name == "map-runs" else grid()
+    if name == "map-several":
+        add(train(drive(0), grid(), "ncc", matcher="best"), drive(2)).save(folder)
+        return lambda place: answers(place, query), "map.json"
     parts: dict[str, Any] = {"map-grid": "ncc", "map-runs": "sad", "map-network": Network(steps=1, batch=4)}
     train(drive(0), places, parts.get(name, "seqslam")).save(folder)
     return lambda place: answers(place, query), "map.json"
@@ -121,13 +124,31 @@ def result_used(folder: Path) -> object:
 
 
 def test_maps(saved: Path, query: Traverse, tmp_path: Path) -> None:
-    good, count, refused = answers(saved, query), 0, 0
-    place = tmp_path / "map"
     arrays = sorted(file.name for file in saved.glob("*.npy"))
     changes: list[Alteration] = list(json_alterations(saved, "map.json"))
     for name in arrays:
         changes += array_alterations(saved, name)
     changes += file_alterations(saved)
+    refused = held(saved, query, tmp_path / "map", changes)
+    assert len(changes) > 200
+    assert refused > len(changes) // 3
+
+
+def test_maps_of_several_drives(query: Traverse, tmp_path: Path) -> None:
+    """What they have besides."""
+    saved_as("map-several", tmp_path / "several", drive(1))
+    changes = [
+        change for change in json_alterations(tmp_path / "several", "map.json") if "drives" in change[0]
+    ]
+    changes += array_alterations(tmp_path / "several", "belongs.npy")
+    refused = held(tmp_path / "several", query, tmp_path / "map", changes)
+    assert len(changes) > 80
+    assert refused > len(changes) // 2
+
+
+def held(saved: Path, query: Traverse, place: Path, changes: list[Alteration]) -> int:
+    """Each change is noticed, or changes nothing; how many are refused that come with their sums."""
+    good, refused = answers(saved, query), 0
     for what, alteration in changes:
         altered(saved, place, alteration)
         found = one_line(what, lambda: answers(place, query))
@@ -136,9 +157,7 @@ def test_maps(saved: Path, query: Traverse, tmp_path: Path) -> None:
             sum_again(place)
             found = one_line(f"{what}, with its sums", lambda: answers(place, query))
             refused += found is None
-        count += 1
-    assert count > 200
-    assert refused > count // 3
+    return refused
 
 
 @pytest.mark.parametrize(

@@ -23,20 +23,23 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places scorers matchers placemap localizer serving evaluation doctor "
-        "testing cli"
+        "core sources imaging drives places torch searchers scorers matchers placemap _regions localizer "
+        "exports serving evaluation doctor testing cli"
     ),
-    "evplace.core": "errors events grey zscores settings families storage workers drawing",
+    "evplace.core": (
+        "errors folders events grey zscores settings families storage state workers cluster drawing"
+    ),
     "evplace.sources": "frames readers live writers cleaning tracks film simulators",
     "evplace.imaging": (
         "windows _resampling representations tones images activity averaging recipe stream store spacing "
         "traverse sheets"
     ),
     "evplace.drives": "datasets to_traverse",
-    "evplace.scorers": "_search _reduction _compressed _distances _seqslam_images _network",
+    "evplace.searchers": "_loops _turned exact int8 bits faiss",
+    "evplace.scorers": "_reduction _compressed _indexed _distances _seqslam_images _network",
     "evplace.scorers._network": "network_onnx network augmentation checkpoint training",
     "evplace.evaluation": "truth sweeps",
-    "evplace_lab": "city descriptor reproduction report cli",
+    "evplace_lab": "city descriptor reproduction report demonstration benchmark cli",
 }
 """Package -> its parts in the order of the data: a part imports only parts before it, or files of its own."""
 
@@ -128,6 +131,10 @@ def _flat_fields(kind: type[Any]) -> Iterator[str]:
 FAMILIES = {**families.MODULES, **families.CLASSES}.values()
 
 
+DOORS = ("evplace.torch",)
+"""Modules that users import by themselves."""
+
+
 def used_only_inside() -> list[str]:
     """Modules without an underscore that no other package of ours imports; parts of families have no user."""
     files = {
@@ -140,7 +147,13 @@ def used_only_inside() -> list[str]:
     for module in files:
         package = module.rpartition(".")[0]
         private = any(part.startswith("_") for part in module.split("."))
-        if private or package in FAMILIES or package.startswith("evplace_lab") or package.endswith(".cli"):
+        if (
+            private
+            or module in DOORS
+            or package in FAMILIES
+            or package.startswith("evplace_lab")
+            or package.endswith(".cli")
+        ):
             continue
         users = {user for user, names in named if any(f"{name}.".startswith(f"{module}.") for name in names)}
         if not any(not f"{user}.".startswith(f"{package}.") for user in users):

@@ -16,8 +16,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace._regions import Compared, Regions, Rough
 from evplace.core import families
-from evplace.core.errors import PartError, PlaceMapError, RecordingError
+from evplace.core.errors import PartError, PlaceMapError, RecordingError, SettingsError
 from evplace.core.events import Events, Size
 from evplace.core.settings import make, to_dict
 from evplace.core.tables import empty_rows, rows_of
@@ -26,14 +27,15 @@ from evplace.imaging.averaging import Averager
 from evplace.imaging.recipe import shown
 from evplace.imaging.stream import EventImage, EventImages
 from evplace.imaging.traverse import Traverse
-from evplace.matchers import Answer, Estimate, Following, Matcher, Path, Seen
+from evplace.matchers import Answer, Estimate, Matcher, Path, RouteMatcher, Seen
 from evplace.matchers import State as StateOfAnswer
 from evplace.matchers._checks import check_answer, check_path
-from evplace.matchers._drives import follow, in_hindsight
+from evplace.matchers._parts import InParts
 from evplace.placemap import PlaceMap, default_matcher
-from evplace.scorers import OpenScorer, Rows, scorer_of
+from evplace.scorers import ComparesSome, OpenScorer, Rows
 from evplace.sources.cleaning import MaskSource, read_mask
 from evplace.sources.readers import Canvas
+from evplace.sources.tracks import Track
 
 BLOCK = 64
 """Images scored at once in hindsight."""
@@ -41,7 +43,8 @@ Answers = Literal["live", "hindsight"]
 """What the camera would have been told as it drove; or what is known once the drive is over."""
 State = StateOfAnswer | Literal["no-events"]
 """What a match is worth: see `evplace.matchers.State`; no-events: the window was empty."""
-
+SURE = ("localised", "standing")
+"""The states of matches that the method stands by."""
 FOLLOWS_US = 33_333
 """How long after the last image of one clock the first of another is taken to be, in microseconds."""
 
@@ -71,6 +74,8 @@ class Match:
     """Where the item looks, clockwise from north; None where unknown."""
     others: tuple[int, ...] = ()
     """The next best items, at other places, best first, where the matcher says them."""
+    compared: Compared = "all"
+    """What its image was compared with: all of the map, or what is near a position or the last match."""
 
 
 class Answered(NamedTuple):
@@ -93,6 +98,8 @@ class Localizer:
         matcher: str | Matcher | None = None,
         preset: str | None = None,
         mask: MaskSource | None = None,
+        near_m: float | None = None,
+        track: Track | Rough | None = None,
         **settings: object,
     ) -> None:
         """For one map, with its own matcher, or another by name, preset and settings, or an object.
@@ -100,18 +107,24 @@ class Localizer:
         `Localizer(campus, matchers.Local(K=5))` and `Localizer(campus, "local", K=5)` are the same; settings
         without a name are those of the map's own matcher. Events are cleaned as those of the map were. Which
         pixels are hot belongs to the drive, so a map that was learned without hot pixels needs the drive's
-        own `mask` (see `evplace.sources.cleaning.read_mask`, and `pixel_mask` to measure it). Raises
-        SettingsError for an unknown matcher, preset or setting.
+        own `mask` (see `evplace.sources.cleaning.read_mask`, and `pixel_mask` to measure it).
+
+        With `near_m`, images are compared with the references within so many metres of a rough position
+        alone: that of `track`, the drive's own or a function of a time that gives east and north in the
+        map's metres or None; without one, that of the last match. Where there is none all are compared;
+        `Match.compared` says which. Raises SettingsError for an unknown matcher, preset or setting,
+        PlaceMapError for `near_m` with a map without positions.
         """
         self.map = place_map
         self.matcher: Matcher = _matcher(place_map, matcher, preset, settings)
         """The matcher with its settings; `reset` begins with it anew."""
         self.mask = mask
         """Pixels of the drive to leave out; it counts from the first packet of a drive."""
+        self.scorer: OpenScorer = place_map.scoring()
         with families.blaming("scorers", place_map.scorer):
-            self.scorer: OpenScorer = scorer_of(place_map.scorer).open(place_map.content)
             self._distances = bool(self.scorer.distances)
         self._route = place_map.route(learned=type(self.matcher) is type(place_map.matcher))
+        self._near = near_m, track
         self.reset()
 
     @property
@@ -123,14 +136,17 @@ class Localizer:
     def reset(self) -> None:
         """Forget the drive so far."""
         with families.blaming("matchers", self.matcher):
-            self._following: Following = follow(self.matcher, self._route, self._distances)
+            self._following = InParts(self.matcher, self._route, self._distances)
+            if self._near[0] is None:
+                self._following.within(None)  # what is wrong with the map is said now
+        self._regions = Regions(self.map, *self._near)
         self._stepped = 0
         self.image: NDArray[np.uint8] | None = None
         """The last image that was matched."""
         self._images: EventImages | None = None
         self._seeing = _Seeing(self.map)
         self._clock = _Clock()
-        self._times_us: dict[int, int] = {}
+        self._times_us: dict[int, tuple[int, Compared]] = {}
 
     def push(self, events: Events) -> Iterator[Match]:
         """The matches of all windows that `events` bring to their end."""
@@ -178,9 +194,16 @@ class Localizer:
     def push_image(self, image: NDArray[np.uint8], t_us: int) -> Iterator[Match]:
         """The matches that become known with one more image (h, w) or (h, w, C)."""
         self.image = image
-        self._times_us[self._stepped] = t_us
         mean, seen = self._seeing.see(image, self._clock.passed(t_us))
-        yield from self._matches(self._step(self.rows(mean[None])[0], seen))
+        region = self._regions.at(t_us)
+        if region.items is not None and not len(region.items):
+            yield Match(t_us, -1, -1, None, np.nan, "unseen", compared=region.compared)
+            return
+        self._times_us[self._stepped] = t_us, region.compared
+        with families.blaming("matchers", self.matcher):
+            wanted = self._following.within(region.items)
+        row = self.rows(mean[None])[0] if wanted is None else self.row_of(mean, wanted)
+        yield from self._matches(self._step(row, seen))
 
     def match_traverse(self, traverse: Traverse) -> Iterator[Match]:
         """The matches of a traverse's images, as `push` would give them for its events.
@@ -210,6 +233,17 @@ class Localizer:
         check_rows(rows, len(images), self.map)
         return rows
 
+    def row_of(self, image: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        """(len(items),) the scores of some items alone, for an image that may be compared."""
+        if isinstance(self.scorer, ComparesSome):
+            with families.blaming("scorers", self.map.scorer):
+                rows: Rows = self.scorer.some(image[None], items)
+        else:
+            rows = self.rows(image[None])[:, items]
+        check_rows(rows, 1, self.map, len(items))
+        row: Rows = rows[0]
+        return row
+
     def answers(self, query: Traverse, answers: Answers = "live", rows: Rows | None = None) -> Answered:
         """One answer for each image of a whole traverse; this localizer forgets what it had seen before.
 
@@ -217,60 +251,28 @@ class Localizer:
         ahead, from as many after it as it waits for. "hindsight": the matcher's `path`, from all images.
         Images without events are answered with -1, and their rows are zero. `rows` are what another localizer
         of this map gave for this traverse in the same way, so that they need not be scored again.
-        PlaceMapError where the query's images were not made as the map's.
+        PlaceMapError where the query's images were not made as the map's, SettingsError with `near_m`.
         """
-        self.map.require_same(query)
-        self.reset()
-        filled = np.flatnonzero(query.counts != 0)
-        rows, seen = self._seen_of(query, filled, answers, rows)
-        live = answers == "live"
-        found, delay = (self._live if live else self._in_hindsight)(rows_of(rows, filled), seen)
-        item = np.full(len(query), -1, np.int64)
-        score = np.full(len(query), np.nan)
-        accepted = np.zeros(len(query), np.bool_)
-        item[filled], score[filled], accepted[filled] = found.item, found.score, found.accepted
-        return Answered(Path(item, score, accepted), rows, delay)
-
-    def _seen_of(
-        self, query: Traverse, filled: NDArray[np.int64], answers: Answers, rows: Rows | None
-    ) -> tuple[Rows, list[Seen]]:
-        """(n, items) rows, made where they are not given, and what else is seen of the images `filled`.
-
-        Live, image by image, since the size of a batch may change the last bits of a score.
-        """
-        made = empty_rows(len(query), len(self.map.items)) if rows is None else rows
-        seen: list[Seen] = []
-        block = 1 if answers == "live" else BLOCK
-        for start in range(0, len(filled), block):
-            part = filled[start : start + block]
-            pairs = [self._seeing.see(np.asarray(query.images[at]), int(query.t_us[at])) for at in part]
-            seen += [one for _, one in pairs]
-            if rows is None:
-                made[part] = self.rows(np.stack([mean for mean, _ in pairs]))
-        return made, seen
+        answering = Answering(self, query, answers, rows, keep=True)
+        for _ in answering:
+            pass
+        path = answering.path()
+        assert answering.rows is not None
+        return Answered(path, answering.rows, answering.delay)
 
     def seen_of(self, query: Traverse) -> tuple[list[Seen], Rows]:
         """What a matcher sees of each image of a traverse, and their rows (n, items), made in blocks."""
-        rows, seen = self._seen_of(query, np.arange(len(query)), "hindsight", None)
+        rows, seen = empty_rows(len(query), len(self.map.items)), list[Seen]()
+        for start in range(0, len(query), BLOCK):
+            part = np.arange(start, min(start + BLOCK, len(query)))
+            images, more = self._shown(query, part)
+            rows[part], seen = self.rows(images), seen + more
         return seen, rows
 
-    def _live(self, rows: Rows, seen: list[Seen]) -> tuple[Path, int]:
-        """The answers, and how many images later one was known at most; -1 where none was ever given."""
-        known = [Answer(at, -1, np.nan, False) for at in range(len(rows))]
-        delay = 0
-        for at, (row, one) in enumerate(zip(rows, seen, strict=True)):
-            for answer in self._step(row, one):
-                known[answer.query] = answer
-                delay = max(delay, at - answer.query)
-        for answer in self._finish():
-            known[answer.query] = answer
-        return Path.of(known), delay
-
-    def _in_hindsight(self, rows: Rows, seen: list[Seen]) -> tuple[Path, int]:
-        with families.blaming("matchers", self.matcher):
-            found = in_hindsight(self.matcher, self._route, self._distances, rows, seen)
-        check_path(found, len(rows), len(self.map.items), self.matcher)
-        return found, max(0, len(rows) - 1)
+    def _shown(self, query: Traverse, part: NDArray[np.int64]) -> tuple[NDArray[np.uint8], list[Seen]]:
+        """Some images of a traverse as the scorer is shown them, and what the matcher is told of them."""
+        pairs = [self._seeing.see(np.asarray(query.images[at]), int(query.t_us[at])) for at in part]
+        return np.stack([mean for mean, _ in pairs]), [one for _, one in pairs]
 
     def _step(self, row: Rows, seen: Seen) -> list[Answer]:
         with families.blaming("matchers", self.matcher):
@@ -296,16 +298,19 @@ class Localizer:
 
     def _matches(self, answers: list[Answer]) -> Iterator[Match]:
         for answer in answers:
-            t_us = self._times_us[answer.query]
+            t_us, compared = self._times_us[answer.query]
             for query in [query for query in self._times_us if query <= answer.query]:
                 del self._times_us[query]
-            yield self._match(t_us, answer)
+            match = self._match(t_us, answer, compared)
+            if answer.accepted and match.position is not None:
+                self._regions.found(t_us, match.position)
+            yield match
 
-    def _match(self, t_us: int, answer: Answer) -> Match:
+    def _match(self, t_us: int, answer: Answer, compared: Compared) -> Match:
         """An answer of the matcher, with what the map knows of its item."""
         state: StateOfAnswer = "localised" if answer.accepted else "unseen"
         if answer.item < 0:
-            return Match(t_us, -1, -1, None, answer.score, "unseen")
+            return Match(t_us, -1, -1, None, answer.score, "unseen", compared=compared)
         items, more = self.map.items, answer.estimate or Estimate(state, math.nan, math.nan, ())
         easting, northing = items.position[answer.item]
         heading = float(items.heading_deg[answer.item])
@@ -313,7 +318,7 @@ class Localizer:
             t_us, answer.item, int(items.place[answer.item]),
             None if np.isnan(easting) else (float(easting), float(northing)),
             answer.score, more.state, more.probability, more.uncertainty_m,
-            None if np.isnan(heading) else heading, more.others,
+            None if np.isnan(heading) else heading, more.others, compared,
         )  # fmt: skip
 
     def _open_images(self, size: Size) -> EventImages:
@@ -328,6 +333,119 @@ class Localizer:
             )
         mask = None if self.mask is None else read_mask(self.mask, size)
         return EventImages(size, recipe, mask)
+
+
+class Answering:
+    """A localizer's answers to a whole traverse, in blocks of images; see `Localizer.answers`.
+
+    Iterating gives (k,) the numbers of the next images that hold events, and (k, items) their rows, which are
+    not kept unless that is asked for, or the matcher needs them all at once.
+    """
+
+    def __init__(
+        self,
+        localizer: Localizer,
+        query: Traverse,
+        answers: Answers = "live",
+        rows: Rows | None = None,
+        keep: bool = False,
+    ) -> None:
+        """`rows` are given, as in `Localizer.answers`; or they are made, and where `keep` says so, kept."""
+        if localizer._near[0] is not None:
+            raise SettingsError("answers to a whole traverse compare all references: leave out `near_m`")
+        localizer.map.require_same(query)
+        localizer.reset()
+        self._of, self._query, self._given = localizer, query, rows
+        self._filled = np.flatnonzero(query.counts != 0)
+        self._live, self._seen, self._done = answers == "live", list[Seen](), 0
+        at_once = not self._live and isinstance(localizer.matcher, RouteMatcher)
+        made = keep or at_once
+        self.rows = empty_rows(len(query), len(localizer.map.items)) if rows is None and made else rows
+        """(n, items), 0 for images without events; None where they are not kept."""
+        with families.blaming("matchers", localizer.matcher):
+            alone = not self._live and not at_once
+            self._matching = localizer.matcher.start(localizer._distances) if alone else None
+        self.delay = 0
+        """Images that came before an answer was known, at most, so far."""
+        nothing = np.full(len(query), -1, np.int64), np.full(len(query), np.nan)
+        self._known = Path(*nothing, np.zeros(len(query), np.bool_))
+
+    def __iter__(self) -> Iterator[tuple[NDArray[np.int64], Rows]]:
+        """Live, image by image, since the size of a batch may change the last bits of a score."""
+        block = 1 if self._live else BLOCK
+        while self._done < len(self._filled):
+            part = self._filled[self._done : self._done + block]
+            images, seen = self._of._shown(self._query, part)
+            rows = self._of.rows(images) if self._given is None else self._given[part]
+            if self.rows is not None and self._given is None:
+                self.rows[part] = rows
+            self._take(rows, seen)
+            self._done += len(part)
+            yield part, rows
+
+    def path(self) -> Path:
+        """The answers, once all images were taken: -1 where an image holds no events."""
+        if self._live:
+            self._note(self._of._finish())
+            return self._known
+        matcher, items = self._of.matcher, len(self._of.map.items)
+        with families.blaming("matchers", matcher):
+            found = self._hindsight()
+        check_path(found, len(self._filled), items, matcher)
+        for known, values in zip(self._known, found, strict=True):
+            known[self._filled] = values
+        self.delay = max(0, len(self._filled) - 1)
+        return self._known
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """What another of the same localizer and traverse goes on from, live, by `resume`."""
+        of, rows = self._of, None if self.rows is None else self.rows[: self._reached]
+        return {
+            "done": self._done, "delay": self.delay, "known": tuple(self._known), "rows": rows,
+            "matcher": (of._following, of._seeing, of._stepped),
+        }  # fmt: skip
+
+    def resume(self, state: Mapping[str, Any]) -> None:
+        """Go on from there."""
+        self._done, self.delay = state["done"], state["delay"]
+        for known, values in zip(self._known, state["known"], strict=True):
+            known[:] = values
+        if self.rows is not None:
+            self.rows[: self._reached] = state["rows"]
+        self._of._following, self._of._seeing, self._of._stepped = state["matcher"]
+
+    @property
+    def _reached(self) -> int:
+        return int(self._filled[self._done - 1]) + 1 if self._done else 0
+
+    def _take(self, rows: Rows, seen: list[Seen]) -> None:
+        """Show the matcher the next images."""
+        if self._matching is not None:
+            with families.blaming("matchers", self._of.matcher):
+                self._matching.extend(rows)
+        elif not self._live:
+            self._seen += seen
+        else:
+            for row, one in zip(rows, seen, strict=True):
+                at = self._of._stepped
+                answers = self._of._step(row, one)
+                self.delay = max([self.delay, *(at - answer.query for answer in answers)])
+                self._note(answers)
+
+    def _note(self, answers: list[Answer]) -> None:
+        for answer in answers:
+            at = self._filled[answer.query]
+            for known, value in zip(self._known, answer[1:4], strict=True):
+                known[at] = value
+
+    def _hindsight(self) -> Path:
+        if self._matching is not None:
+            return self._matching.path()
+        assert self.rows is not None
+        of = self._of
+        assert isinstance(of.matcher, RouteMatcher)
+        return of.matcher.in_hindsight(of._route, rows_of(self.rows, self._filled), self._seen)
 
 
 class _Seeing:
@@ -377,9 +495,9 @@ def _matcher(
     return made
 
 
-def check_rows(rows: object, images: int, place_map: PlaceMap) -> None:
-    """PartError where a scorer gives anything but finite (images, items) scores."""
-    wanted = (images, len(place_map.items))
+def check_rows(rows: object, images: int, place_map: PlaceMap, items: int | None = None) -> None:
+    """PartError where a scorer gives anything but finite (images, items) scores; of all items or some."""
+    wanted = (images, len(place_map.items) if items is None else items)
     kind, unfinite = type(rows).__name__, ""
     if isinstance(rows, np.ndarray):
         kind = f"{rows.dtype} {rows.shape}"

@@ -19,23 +19,6 @@ from evplace.imaging.traverse import Traverse
 Capture = pytest.CaptureFixture[str]
 
 
-@pytest.fixture(scope="session")
-def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """day.aedat4, night.aedat4 and their logs, day.csv and night.csv."""
-    folder = tmp_path_factory.mktemp("files")
-    write_drive(folder, "day", make_drive())
-    write_drive(folder, "night", make_drive(seed=1, noise=0.02))
-    return folder
-
-
-@pytest.fixture(scope="session")
-def street(files: Path) -> Path:
-    """A map of the day's images."""
-    arguments = ["train", f"{files}/day.aedat4", "--track", f"{files}/day.csv", "-o", f"{files}/street.evp"]
-    assert main([*arguments, "--scorer", "ncc"]) == 0
-    return files / "street.evp"
-
-
 def json_of(capsys: Capture, *arguments: object) -> Any:
     """What a command prints with --json."""
     capsys.readouterr()
@@ -80,7 +63,8 @@ def test_train_localize_evaluate_compare(files: Path, street: Path, tmp_path: Pa
     assert main(["localize", str(street), f"{files}/night.aedat4", "--matcher", "best", "-o", str(csv)]) == 0
     lines = csv.read_text().splitlines()
     assert lines[0] == (
-        "t_us,place,easting,northing,score,state,latitude,longitude,heading_deg,probability,uncertainty_m"
+        "t_us,place,easting,northing,score,state,latitude,longitude,heading_deg,probability,uncertainty_m,"
+        "compared"
     )
     assert abs(float(lines[1].split(",")[6])) < 90
     assert len(lines) == 61

@@ -77,7 +77,7 @@ def test_a_damaged_recording_is_examined_and_ends_with_3(day: Path, capsys: Capt
     ("arguments", "words"),
     [
         (["none.aedat4"], "none.aedat4"),
-        (["day.csv"], "known are"),
+        (["notes.txt"], "known are"),
         (["day.aedat4", "--track", "none.nmea"], "none.nmea"),
         (["day.aedat4", "--dt", "0"], "'dt'"),
         (["day.aedat4", "--dt", "1/0"], "'dt'"),
@@ -88,7 +88,26 @@ def test_what_cannot_be_read_ends_with_2(
     day: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch, arguments: list[str], words: str
 ) -> None:
     monkeypatch.chdir(day)
+    (day / "notes.txt").write_text("dear diary")
     assert main(["doctor", *arguments]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1
     assert words in lines[0]
+
+
+def test_strict_ends_with_2_where_something_is_bad(day: Path, capsys: Capture) -> None:
+    recording = f"{day}/day.aedat4"
+    assert main(["doctor", recording, "--dt", "1/30000"]) == 0
+    assert main(["doctor", recording, "--dt", "1/30000", "--strict"]) == 2
+    assert "bad" in capsys.readouterr().out
+
+
+def test_a_log_is_examined_by_itself(day: Path, capsys: Capture) -> None:
+    assert main(["doctor", f"{day}/day.csv", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["facts"]["kind"] == "fixes"
+    names = {finding["name"] for finding in found["findings"]}
+    assert {"GPS fixes", "GPS gaps", "GPS jumps"} <= names
+    assert "GPS coverage" not in names
+    assert main(["doctor", f"{day}/day.csv"]) == 0
+    assert "fixes" in capsys.readouterr().out

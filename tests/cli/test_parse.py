@@ -24,7 +24,9 @@ from evplace.core import families
 from evplace.core.errors import SettingsError
 
 Capture = pytest.CaptureFixture[str]
-TAKE_SETTINGS = ("city", "doctor", "evaluate", "images", "localize", "match", "serve", "simulate", "train")
+TAKE_SETTINGS = (
+    "city", "doctor", "evaluate", "images", "localize", "map", "match", "serve", "simulate", "train",
+)  # fmt: skip
 
 
 def in_force(capsys: Capture, *words: object) -> dict[str, tuple[object, str]]:
@@ -307,7 +309,7 @@ def test_any_value_of_any_key_is_taken_or_refused(data: st.DataObject, command: 
 def test_a_file_may_hold_all_that_flags_can_say(tmp_path: Path, toml: Path, capsys: Capture) -> None:
     write_drive(tmp_path, "day", make_drive(windows=4))
     toml.write_text(
-        f'source = "{tmp_path / "day.aedat4"}"\nout = "{tmp_path / "t"}"\nsize = [80, 60]\njson = true\n'
+        f'sources = ["{tmp_path / "day.aedat4"}"]\nout = "{tmp_path / "t"}"\nsize = [80, 60]\njson = true\n'
         '[windows]\ndt = "1/15"\n'
     )
     capsys.readouterr()
@@ -328,12 +330,12 @@ def orders(words: list[str], more: list[list[str]]) -> Iterator[list[str]]:
     ("command", "names", "out"),
     [
         ("convert", ("source", "target"), []),
-        ("info", ("recording",), []),
+        ("info", ("path",), []),
         ("doctor", ("recording",), []),
         ("localize", ("map", "source"), []),
-        ("evaluate", ("map", "source"), ["-o", "r"]),
-        ("images", ("source",), ["-o", "r"]),
-        ("train", ("source",), ["--out=r"]),
+        ("evaluate", ("map", "sources"), ["-o", "r"]),
+        ("images", ("sources",), ["-o", "r"]),
+        ("train", ("sources",), ["--out=r"]),
     ],
 )
 def test_a_flag_of_two_values_stands_anywhere(command: str, names: tuple[str, ...], out: list[str]) -> None:
@@ -342,7 +344,11 @@ def test_a_flag_of_two_values_stands_anywhere(command: str, names: tuple[str, ..
         for line in orders(words, [size, ["--json", *out]]):
             args = args_of(command, *line)
             assert args.size == (640, 480)
-            assert [getattr(args, name) for name in names] == [Path(word) for word in words]
+            read = [
+                Path(word) if name != "sources" else (Path(word),)
+                for name, word in zip(names, words, strict=True)
+            ]
+            assert [getattr(args, name) for name in names] == read
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
@@ -419,7 +425,7 @@ def test_settings_of_parts_are_checked_before_the_work(tmp_path: Path, capsys: C
 
 def test_words_after_two_dashes_are_no_flags() -> None:
     args = args_of("images", "-o", "x", "--dt", "1/30", "--", "--width")
-    assert args.source == Path("--width")
+    assert args.sources == (Path("--width"),)
     assert "dt" in args.given
     assert "width" not in args.given
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from conftest import HANG_S
-from evplace.core.errors import EvplaceError, MissingExtraError, OutputError, SettingsError
-from evplace.core.workers import packed, run_all, start, unpacked
+from evplace.core.errors import EvplaceError, MissingExtraError, OutputError, SettingsError, WorkerLostError
+from evplace.core.workers import Here, packed, run_all, start, unpacked
 
+HERE = Path()
 WORKER = """
 import os, sys, time
 from evplace.core.errors import MissingExtraError, SettingsError
@@ -26,6 +27,10 @@ def work(job, say):
         say("nobody ended it")
     if job["does"] == "break":
         sys.exit(3)
+    if job["does"] == "die once" and not os.path.exists(job["mark"]):
+        open(job["mark"], "w").close()
+        say("on its way")
+        os.kill(os.getpid(), 9)
     if job["does"] == "die":
         os.kill(os.getpid(), 9)
     for k in range(job["lines"]):
@@ -45,35 +50,63 @@ def module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 def test_every_line_is_told_with_the_job_that_said_it(module: str) -> None:
     lines: list[tuple[int, str]] = []
     jobs = [{"does": "say", "name": name, "lines": 3} for name in "ab"]
-    run_all(module, jobs, 2, lambda index, line: lines.append((index, line)))
+    run_all(module, jobs, Here(2), HERE, lambda index, line: lines.append((index, line)))
     assert sorted(lines) == [(n, f"{'ab'[n]} {k}") for n in (0, 1) for k in range(3)]
-    run_all(module, [], 2, lambda index, line: lines.clear())
+    run_all(module, [], Here(2), HERE, lambda index, line: lines.clear())
     assert lines
 
 
-def test_errors_travel_and_a_killed_worker_is_told(module: str) -> None:
+def test_errors_travel(module: str) -> None:
     with pytest.raises(SettingsError, match="a line of its own"):
-        run_all(module, [{"does": "fail"}], 1, print)
+        run_all(module, [{"does": "fail"}], Here(1), HERE, print)
     with pytest.raises(EvplaceError, match="train"):
-        run_all(module, [{"does": "lack"}], 1, print)
-    with pytest.raises(OutputError, match="signal 9: run again to go on"):
-        run_all(module, [{"does": "die"}], 1, print)
+        run_all(module, [{"does": "lack"}], Here(1), HERE, print)
     with pytest.raises(OutputError, match="exit code 3"):
-        run_all(module, [{"does": "break"}], 1, print)
+        run_all(module, [{"does": "break"}], Here(1), HERE, print)
+
+
+def test_the_job_of_a_killed_worker_is_done_again(module: str, tmp_path: Path) -> None:
+    lines: list[str] = []
+    job = {"does": "die once", "mark": str(tmp_path / "mark"), "name": "a", "lines": 2}
+    with pytest.warns(UserWarning, match="signal 9: its job is done again"):
+        run_all(module, [job], Here(1), HERE, lambda _, line: lines.append(line))
+    assert lines == ["on its way", "a 0", "a 1"]
+
+
+@pytest.mark.filterwarnings("ignore:a worker was stopped by signal 9")
+def test_a_job_that_kills_its_workers_is_given_up(module: str) -> None:
+    with pytest.raises(WorkerLostError, match="signal 9, and so were 2 before it at the same job"):
+        run_all(module, [{"does": "die"}], Here(1), HERE, print)
+
+
+def test_other_jobs_go_on_where_each_error_is_taken(module: str) -> None:
+    errors: list[tuple[int, str]] = []
+    lines: list[str] = []
+    jobs = [{"does": "fail"}, {"does": "say", "name": "b", "lines": 1}, {"does": "break"}]
+    run_all(
+        module, jobs, Here(1), HERE, lambda _, line: lines.append(line),
+        lambda index, error: errors.append((index, str(error)[:15])),
+    )  # fmt: skip
+    assert lines == ["b 0"]
+    assert errors == [(0, "a line of its o"), (2, "a worker failed")]
 
 
 def test_the_first_error_ends_all(module: str) -> None:
     lines: list[str] = []
     jobs = [{"does": "wait", "lines": 0}, {"does": "fail"}, {"does": "wait", "lines": 0}]
     with pytest.raises(SettingsError):
-        run_all(module, jobs, 2, lambda _, line: lines.append(line))
+        run_all(module, jobs, Here(2), HERE, lambda _, line: lines.append(line))
     assert lines == []
 
 
 def test_a_job_may_be_long(module: str) -> None:
     lines: list[str] = []
     run_all(
-        module, [{"does": "say", "name": "n" * 300_000, "lines": 1}], 1, lambda _, line: lines.append(line)
+        module,
+        [{"does": "say", "name": "n" * 300_000, "lines": 1}],
+        Here(1),
+        HERE,
+        lambda _, line: lines.append(line),
     )
     assert len(lines[0]) == 300_002
 
@@ -86,7 +119,9 @@ def test_files_of_the_current_folder_are_not_taken_for_modules(
         (tmp_path / "here" / f"{name}.py").write_text("raise SystemExit('not this one')")
     monkeypatch.chdir(tmp_path / "here")
     lines: list[str] = []
-    run_all(module, [{"does": "say", "name": "é", "lines": 1}], 1, lambda _, line: lines.append(line))
+    run_all(
+        module, [{"does": "say", "name": "é", "lines": 1}], Here(1), HERE, lambda _, line: lines.append(line)
+    )
     assert lines == ["é 0"]
 
 
@@ -101,7 +136,7 @@ def test_one_that_dies_before_it_has_its_job_is_told(tmp_path: Path, monkeypatch
     (tmp_path / "deaf_worker.py").write_text("import os; os.close(0); os._exit(4)")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(OutputError, match="exit code 4"):
-        run_all("deaf_worker", [{"long": "n" * 1_000_000}], 1, print)
+        run_all("deaf_worker", [{"long": "n" * 1_000_000}], Here(1), HERE, print)
 
 
 def test_a_worker_ends_with_its_caller(module: str) -> None:

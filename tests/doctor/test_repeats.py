@@ -8,6 +8,7 @@ from examined import SIZE, found, merged, noise
 
 from evplace.core.events import Events
 from evplace.doctor import repeats
+from evplace.doctor._subject import SOON_US
 
 
 def plain(events: Events) -> tuple[int, int]:
@@ -17,7 +18,7 @@ def plain(events: Events) -> tuple[int, int]:
         before = last.get((x, y))
         if before == (t, p):
             twice += 1
-        elif before is not None and t - before[0] < repeats.SOON_US:
+        elif before is not None and t - before[0] < SOON_US:
             soon += 1
         last[x, y] = (t, p)
     return twice, soon

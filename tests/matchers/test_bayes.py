@@ -148,7 +148,7 @@ def test_a_transposed_move_undoes_no_product() -> None:
     one, later = rng.random((2, 30, len(belief.SPEEDS)))
     steps = belief.SPEEDS * 0.9
     there, back = np.empty_like(one), np.empty_like(one)
-    loops.move(one, ways.way, steps, there)
+    loops.move(one, ways.way, steps, there, np.empty(len(steps), np.uint64))
     loops.move_back(later, ways.way, steps, 0.0, back)
     np.testing.assert_allclose((later * there).sum(), (back * one).sum())
     loops.pass_links(one, *ways.links, 0.3, there)

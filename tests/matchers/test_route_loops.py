@@ -41,7 +41,7 @@ def test_a_move_is_the_plain_one(seconds: float) -> None:
     way = np.cumsum(RNG.uniform(0, 3, 200) * (RNG.random(200) < 0.8))
     before = RNG.random((200, len(belief.SPEEDS)))
     found, steps = np.empty_like(before), belief.SPEEDS * seconds
-    loops.move(before, way, steps, found)
+    loops.move(before, way, steps, found, np.empty(len(steps), np.uint64))
     np.testing.assert_array_equal(found, plain_move(before, way, steps))
 
 

@@ -20,9 +20,11 @@ from made_pages import ROOT, Block, blocks, pages, write_drives
 
 ONLY_READ = {
     "evplace city": "drives for minutes",
+    "evplace bench": "needs that city",
     "evplace demo": "drives for minutes",
     "evplace reproduce": "trains for an hour",
     "evplace report out": "shows what that has made",
+    "evplace images /shared/": "needs a cluster",
     "evplace serve": "goes on until it is stopped",
     "evplace localize campus.evp udp:": "goes on until it is stopped",
     "evplace localize campus.evp zenoh:": "goes on until it is stopped",
@@ -140,6 +142,7 @@ PROGRAMS: dict[str, Callable[[list[str]], int]] = {
     "evplace": evplace,
     "pip": pip,
     "python": python,
+    "ray": lambda _: 0,  # another program's words
     "scripts": script,
 }
 """Program -> how a line of it is tried."""

@@ -1,4 +1,4 @@
-"""The pages hang together: links lead somewhere, every page is reached, every part is named, figures agree."""
+"""The pages hang together: links lead somewhere, every page is reached, every part named, figures agree."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from made_pages import ROOT, pages
 
 import evplace
 from evplace.core import families
+from made_pages import ROOT, pages
 
 DOCS = ROOT / "docs"
 OTHERS = ("ARCHITECTURE", "CHANGELOG", "CONTRIBUTING", "SECURITY", "bench/README", "ros/README")

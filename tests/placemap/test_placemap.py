@@ -57,7 +57,7 @@ def test_a_missing_part_is_told(network_map: PlaceMap, tmp_path: Path) -> None:
     (tmp_path / "map" / "network.onnx").unlink()
     with pytest.raises(PlaceMapError, match=r"lacks network\.onnx"):
         PlaceMap.load(tmp_path / "map")
-    with pytest.raises(PlaceMapError, match="is no map"):
+    with pytest.raises(PlaceMapError, match="not a map: give"):
         PlaceMap.load(tmp_path)
 
 

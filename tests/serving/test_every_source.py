@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import socket
 import subprocess
@@ -18,9 +17,10 @@ import pytest
 
 from conftest import HANG_S, Drive
 from evplace.cli import main
-from evplace.cli.localize import _object
 from evplace.core import families
 from evplace.core.events import Events
+from evplace.exports import json as json_lines
+from evplace.exports import located
 from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap
 from evplace.serving._drive import Drive as LiveDrive
@@ -225,6 +225,6 @@ def test_live_is_offline_byte_for_byte(
         drive.start()
         assert drive.ended.wait(HANG_S)
     assert drive.fault is None
-    lines = [json.dumps(_object(report.match, place_map)) + "\n" for report in reports]
-    assert "".join(lines) == offline
+    lines = json_lines.lines(located([report.match for report in reports], place_map))
+    assert "".join(f"{line}\n" for line in lines) == offline
     assert feed.counters().events == len(events)

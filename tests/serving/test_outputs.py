@@ -16,11 +16,12 @@ from hypothesis import strategies as st
 
 from conftest import HANG_S
 from evplace.core.errors import OutputError
+from evplace.exports.nmea import sentence
 from evplace.localizer import Match
 from evplace.placemap import PlaceMap
 from evplace.serving._feed import Counters
 from evplace.serving._report import Report, epsg
-from evplace.serving.nmea import sentence, sentences
+from evplace.serving.nmea import sentences
 from evplace.serving.outputs import Output
 from evplace.serving.ros import (
     TYPES,
@@ -96,12 +97,12 @@ def test_the_checksum_is_the_exclusive_or(body: str) -> None:
     total = 0
     for sign in body:
         total ^= ord(sign)
-    assert text == f"${body}*{total:02X}\r\n"
+    assert text == f"${body}*{total:02X}"
 
 
 @given(st.floats(-80, 80), st.floats(-180, 180))
 def test_minutes_never_reach_sixty(latitude: float, longitude: float) -> None:
-    from evplace.serving.nmea import _angle
+    from evplace.exports.nmea import _angle
 
     for degrees, digits in ((latitude, 2), (longitude, 3)):
         text = _angle(degrees, digits)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from evplace.cli._output import note
 from evplace.cli._settings import Pairs, Part, SettingsFlags, a_part_of, a_preset_of
 from evplace.core.errors import EvplaceError
 from evplace.localizer import Localizer
@@ -45,7 +44,7 @@ class MatcherFlags(SettingsFlags):
     set: Pairs = ()
     """A setting of the matcher, as name=value: K=5, tau1=0.99, tau2=0.01 for local."""
 
-    def matcher_settings(self) -> dict[str, object]:
+    def matcher_settings(self) -> dict[str, Any]:
         """The settings that flags give, those with flags of their own among them."""
         own = {"false_accept": self.false_accept, "lag_s": self.lag_s}
         return dict(self.set) | {name: value for name, value in own.items() if value is not None}
@@ -57,13 +56,13 @@ def is_measured(place_map: PlaceMap) -> bool:
     return not learns or place_map.learned is not None
 
 
-def note_matches(where: Localizer, matches: int, accepted: int) -> None:
-    """Say what a user would wonder at: that no match has a probability, or none was accepted."""
-    if not is_measured(where.map):
-        note(NOT_MEASURED)
+def matches_noted(where: Localizer, matches: int, accepted: int) -> list[str]:
+    """What a user would wonder at: that no match has a probability, or none was accepted."""
+    notes = [] if is_measured(where.map) else [NOT_MEASURED]
     if matches and not accepted:
-        note(
+        notes.append(
             f"none of the {matches} matches was accepted: the drive may be of another road or sensor than "
             f"the map, or the matcher '{where.settings['name']}' asks for too much; --matcher best accepts "
             "all, --false-accept 0.1 more"
         )
+    return notes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import os
 import re
 import sys
 import warnings
@@ -97,14 +98,31 @@ def note_guesses(notes: object) -> None:
         note(str(guess))
 
 
+def show_page(address: str) -> None:
+    """Open a page or picture in a browser, where that is a window: in a terminal it would take that over."""
+    if sys.platform in ("win32", "darwin") or {"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ):
+        import webbrowser
+
+        webbrowser.open(address)
+
+
 @contextlib.contextmanager
 def remarks() -> Iterator[None]:
     """Warnings within the block as remarks, once it ends well."""
+    with warned() as texts:
+        yield
+    for text in texts:
+        note(text)
+
+
+@contextlib.contextmanager
+def warned() -> Iterator[list[str]]:
+    """The texts of warnings within the block, once it ends well."""
+    texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        yield
-    for remark in caught:
-        note(str(remark.message))
+        yield texts
+    texts += [str(warning.message) for warning in caught]
 
 
 @contextlib.contextmanager

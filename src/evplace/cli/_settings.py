@@ -15,6 +15,9 @@ from tyro.constructors import PrimitiveConstructorSpec
 from evplace.core import families, settings
 from evplace.core.errors import SettingsError
 
+NAME = "{name}"
+"""In the path of a log, a mask and so on: the name of that of many drives to which it belongs."""
+
 
 def pair(text: str) -> tuple[str, object]:
     """`K=5` as ("K", 5): the value is read as TOML, or as text where it is not TOML."""

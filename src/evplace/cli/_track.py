@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
-from evplace.cli._settings import Pairs, Part, SettingsFlags, a_preset_of
+from evplace.cli._settings import NAME, Pairs, Part, SettingsFlags, a_preset_of
 from evplace.core import families
 from evplace.core.errors import SettingsError
 from evplace.sources.tracks import Track, format_of, open_track
@@ -20,7 +20,7 @@ MOST_S = 1e10
 
 def _format(args: TrackFlags) -> tuple[str, type[Any], Mapping[str, Any]] | None:
     """The format of the track's log, its settings and presets."""
-    if args.track is None:
+    if args.track is None or NAME in str(args.track):  # of many drives: each is asked for its own
         return None
     name = format_of(args.track)
     return f"the track format '{name}'", *families.settings_of("tracks", name)

@@ -1,4 +1,4 @@
-"""Compare results side by side; reads what was saved and never runs anything again.
+"""Compare results side by side, and say in which settings they differ; nothing is run again.
 
 Examples:
   evplace compare night.result rain.result
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import tyro
 
@@ -50,7 +51,35 @@ def run(args: Args) -> int:
     unknown = [name for name in args.figures if all(name not in row for row in rows)]
     if unknown:
         raise SettingsError(f"no result has the figure '{unknown[0]}': known are {', '.join(rows[0])}")
-    print_table(
-        "", ("result", *args.figures), [[row["result"], *[row.get(n) for n in args.figures]] for row in rows]
-    )
+    names = [str(row["result"]) for row in rows]
+    print_table("", ("result", *args.figures), [[row["result"], *map(row.get, args.figures)] for row in rows])
+    differing = _differing(rows)
+    if differing:
+        lines = [[name, *(_text(row.get(name)) for row in rows)] for name in differing]
+        print_table("What differs", ("setting", *names), lines)
     return 0
+
+
+def _differing(rows: list[dict[str, Any]]) -> list[str]:
+    """The settings in which the results differ: which parts were used, and settings that they have in common.
+
+    What only one part has needs no line beside another part's name; nor has what a map remembers to be
+    matched with, where it was matched otherwise.
+    """
+    figures = {name for row in rows for name in row if not _is_setting(name)}
+    named = dict.fromkeys(name for row in rows for name in row if name not in figures)
+    found = []
+    for name in named:
+        values = {_text(row.get(name)) for row in rows}
+        shared = name.endswith(".name") or sum(row.get(name) is not None for row in rows) > 1
+        if len(values) > 1 and shared and not name.startswith("map.matcher."):
+            found.append(name)
+    return found
+
+
+def _is_setting(name: str) -> bool:
+    return "." in name or name in ("answers", "query")
+
+
+def _text(value: object) -> str:
+    return "-" if value is None else str(value)

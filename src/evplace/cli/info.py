@@ -1,18 +1,22 @@
-"""What an event recording holds.
+"""What a recording, a map, a traverse, a result, a city, a data set or a folder of images holds.
 
 Examples:
   evplace info night.aedat4
   evplace info night.raw --size 640 480      a header without the sensor's size
   evplace info night.aedat4 --json           one object: format, width, height, events, times, dropped
+  evplace info campus.evp                    what was learned, by what, and where
+  evplace info city                          which drives and sensors, and what to give to other commands
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import tyro
 
+from evplace.cli._folders import facts_of
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
 from evplace.cli._recording import RecordingFlags
 from evplace.core.errors import DamagedRecordingError
@@ -22,15 +26,36 @@ from evplace.core.errors import DamagedRecordingError
 class Args(RecordingFlags):
     """Flags of `evplace info`."""
 
-    recording: tyro.conf.Positional[Path]
-    """An event recording of any known format."""
+    path: tyro.conf.Positional[Path]
+    """An event recording of any known format, or a folder that evplace wrote or reads."""
     json: bool = False
     """Print one JSON object."""
 
 
 def run(args: Args) -> int:
-    """Read the whole recording and say what is in it."""
-    recording = args.opened(args.recording)
+    """Say what is in it; a recording is read to its end."""
+    known = facts_of(args.path)
+    if known is None:
+        return _recording(args)
+    if args.json:
+        print_json(known)
+    else:
+        print_facts(f"{args.path}: {known['kind']}", _in_words(known))
+    return 0
+
+
+def _in_words(known: dict[str, Any]) -> dict[str, object]:
+    """What is known, as people want it."""
+    return {
+        name.replace("_", " "): ", ".join(map(str, value)) if isinstance(value, list) else value
+        for name, value in known.items()
+        if name != "kind" and value not in (None, [])
+    }
+
+
+def _recording(args: Args) -> int:
+    """What a recording holds, read to its end."""
+    recording = args.opened(args.path)
     fault = None
     try:
         for _ in recording.packets():
@@ -52,7 +77,7 @@ def run(args: Args) -> int:
     if args.json:
         print_json(facts)
     else:
-        print_facts(str(args.recording), _shown(facts, first, last))
+        print_facts(str(args.path), _shown(facts, first, last))
     if fault is not None:
         note(f"{fault}; the events before it were counted")
     return USED_GOOD_PART if fault is not None else 0

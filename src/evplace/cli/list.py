@@ -17,8 +17,9 @@ from evplace.cli._output import print_facts, print_json
 from evplace.core import families
 
 Family = Literal[
-    "readers", "live", "writers", "tracks", "datasets", "representations", "scorers", "matchers", "doctor"
-]
+    "readers", "live", "writers", "tracks", "datasets", "representations", "searchers", "scorers", "matchers",
+    "exports", "doctor",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import sys
 import threading
-import webbrowser
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +24,7 @@ from typing import Any, ClassVar
 from urllib.parse import quote
 
 from evplace.cli._matcher import MatcherFlags
-from evplace.cli._output import note, note_guesses
+from evplace.cli._output import note, note_guesses, show_page
 from evplace.cli._settings import Pairs, Part
 from evplace.core import families
 from evplace.localizer import Localizer
@@ -141,8 +139,8 @@ async def _serve(args: Args, service: Service, listening: Any, token: str | None
     def ready(stop: Stop) -> None:
         query = f"?token={quote(token, safe='')}" if token and args.token else ""
         note(f"{args.source} is localised in {args.map}: open {address}{query}; Ctrl-C ends it")
-        if args.open and _has_screen():
-            webbrowser.open(address + query)
+        if args.open:
+            show_page(address + query)
         if args.stop_at_end:
             threading.Thread(target=_end_with, args=(service, stop), daemon=True).start()
 
@@ -152,11 +150,6 @@ async def _serve(args: Args, service: Service, listening: Any, token: str | None
 def _end_with(service: Service, stop: Stop) -> None:
     service.drive.ended.wait()
     stop()
-
-
-def _has_screen() -> bool:
-    """Whether a browser would open a window: in a terminal it would take that over."""
-    return sys.platform in ("win32", "darwin") or bool({"DISPLAY", "WAYLAND_DISPLAY"} & set(os.environ))
 
 
 def _say_end(service: Service) -> None:

@@ -17,6 +17,8 @@ EvplaceError
 │   ├── ScoresError          score rows that a matcher cannot use
 │   └── EvaluationError      truth and answers that do not fit
 └── OutputError              an output exists, is being written by another process, or the disk is full
+    ├── WorkerLostError      a process was killed before its job was done
+    └── WorkerFailedError    a process ended otherwise than by an error of these
 
 The text of each says what is wrong, what was given, and what to do. It names the library's arguments in
 backquotes, `time_unit` or `fps=30`, and never a flag; the command line shows such words as its flags,
@@ -98,3 +100,11 @@ class EvaluationError(InputError):
 
 class OutputError(EvplaceError):
     """An output cannot be written."""
+
+
+class WorkerLostError(OutputError):
+    """A process was killed, or its machine was lost, before its job was done."""
+
+
+class WorkerFailedError(OutputError):
+    """A process that did a job ended by an error that is none of these."""

@@ -23,6 +23,7 @@ from evplace.core.errors import EvplaceError, PartError, SettingsError, Unsuppor
 MODULES = {
     "readers": "evplace.sources.readers",
     "writers": "evplace.sources.writers",
+    "exports": "evplace.exports",
     "tracks": "evplace.sources.tracks",
     "datasets": "evplace.drives.datasets",
     "doctor": "evplace.doctor",
@@ -32,6 +33,7 @@ MODULES = {
 CLASSES = {
     "live": "evplace.sources.live",
     "representations": "evplace.imaging.representations",
+    "searchers": "evplace.searchers",
     "scorers": "evplace.scorers",
     "matchers": "evplace.matchers",
 }

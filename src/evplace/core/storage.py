@@ -132,6 +132,14 @@ def locked(target: Path) -> Iterator[None]:
         os.close(handle)
 
 
+def remove_left(path: str | Path) -> None:
+    """Remove what a killed writer of `path` left beside it, unless another is writing it."""
+    target = named(path)
+    if target.parent.is_dir():
+        with contextlib.suppress(OutputError), locked(target):
+            _clean(target.name, target)
+
+
 def write_json(path: Path, value: object) -> None:
     """`value` as indented JSON; NaN and infinity are refused, because JSON has none."""
     path.write_text(json.dumps(value, indent=1, allow_nan=False) + "\n", "utf-8")

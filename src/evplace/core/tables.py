@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,20 +19,22 @@ CHUNK = 1 << 24
 """Bytes written at once."""
 
 
-def empty_rows(queries: int, items: int) -> Rows:
-    """(queries, items) zeros; InputError where neither memory nor disk should hold them.
+def empty_rows(queries: int, items: int, kind: np.dtype[Any] | type[np.float32] = np.float32) -> Rows:
+    """(queries, items) zeros, of float32 or another `kind`.
 
-    Of a table in a file, the system holds in memory what it has room for.
+    InputError where neither memory nor disk should hold them. Of a table in a file, the system holds in
+    memory what it has room for.
     """
-    if 4 * queries * items <= MEMORY_BYTES:
-        return np.zeros((queries, items), np.float32)
+    size = queries * items * np.dtype(kind).itemsize
+    if size <= MEMORY_BYTES:
+        return np.zeros((queries, items), kind)
     try:
         with tempfile.TemporaryFile() as file:
-            _fill(file, 4 * queries * items)
-            return np.memmap(file, np.float32, "r+", shape=(queries, items))
+            _fill(file, size)
+            return np.memmap(file, kind, "r+", shape=(queries, items))
     except OSError as error:
         raise InputError(
-            f"{queries} x {items} scores, {4e-9 * queries * items:.1f} GB, do not fit into "
+            f"{queries} x {items} scores, {1e-9 * size:.1f} GB, do not fit into "
             f"{tempfile.gettempdir()} ({error.strerror}): set TMPDIR to a folder with more room"
         ) from error
 

@@ -17,10 +17,26 @@ def robust_z(row: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
     Zero where all scores are alike.
     """
     values = np.asarray(row, np.float32)
-    some = values[:: max(len(values) // MOST_ORDERED, 1)]
+    return z_by(values[ordered(len(values))], values)
+
+
+def z_by(usual: NDArray[np.floating[Any]], scores: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
+    """(n,) some scores of a row by those (m,) that say what is usual."""
+    middle, spread = scale_of(np.asarray(usual, np.float32))
+    if not spread:
+        return np.zeros(len(scores), np.float32)
+    return np.asarray((scores - middle) / np.float32(spread), np.float32)
+
+
+def scale_of(some: NDArray[np.float32]) -> tuple[np.float32, float]:
+    """The median of scores and half their 16 to 84 % range, which is 0 where all are alike."""
     low, middle, high = (int(share * (len(some) - 1)) for share in (0.16, 0.5, 0.84))
-    ordered = np.partition(some, sorted({low, middle, high}))
-    spread = float(ordered[high] - ordered[low]) / 2
-    if spread <= 1e-6 * float(np.abs(ordered[[low, middle, high]]).max()):
-        return np.zeros(len(values), np.float32)
-    return np.asarray((values - ordered[middle]) / np.float32(spread), np.float32)
+    sorted_there = np.partition(some, sorted({low, middle, high}))
+    spread = float(sorted_there[high] - sorted_there[low]) / 2
+    alike = spread <= 1e-6 * float(np.abs(sorted_there[[low, middle, high]]).max())
+    return sorted_there[middle], 0.0 if alike else spread
+
+
+def ordered(items: int) -> slice:
+    """The scores of a row that are put in order: those that say what is usual."""
+    return slice(None, None, max(items // MOST_ORDERED, 1))

@@ -12,7 +12,7 @@ What several need is measured once, by the subject itself. The limits are ours: 
 from __future__ import annotations
 
 from evplace.doctor._drawing import as_json, check_drawing, draw
-from evplace.doctor._examining import examine
+from evplace.doctor._examining import examine, examine_log
 from evplace.doctor._outcome import STATES, Curve, Examination, Finding, Map, Outcome
 from evplace.doctor._subject import Subject
 
@@ -28,4 +28,5 @@ __all__ = [
     "check_drawing",
     "draw",
     "examine",
+    "examine_log",
 ]

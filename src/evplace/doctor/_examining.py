@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from evplace.core import families
 from evplace.core.errors import DamagedRecordingError, InputError, TrackError
 from evplace.core.events import Events, Size
+from evplace.doctor import gps
 from evplace.doctor._outcome import STATES, Examination, Finding, Outcome
 from evplace.doctor._subject import Subject
 from evplace.drives.to_traverse import on_its_day, open_source
@@ -56,6 +57,18 @@ def examine(
     if isinstance(recording, Film):
         return _film(recording, windows, positions)
     return _examined(Subject(recording.path, "events", recording.size, windows, positions, recording))
+
+
+def examine_log(path: str | Path, track: Track) -> Examination:
+    """Examine a log of positions by itself; `track` is what it holds."""
+    positions = _known(track)
+    assert positions is not None  # a track has fixes, or it would have said so
+    facts = {
+        "kind": "fixes", "fixes": len(positions), "t_first_us": int(positions.t_us[0]),
+        "t_last_us": int(positions.t_us[-1]), "dropped": positions.dropped,
+    }  # fmt: skip
+    findings = sorted(gps.of_track(positions), key=lambda finding: STATES.index(finding.state))
+    return Examination(str(path), facts, tuple(findings), (), positions.fault)
 
 
 def _known(track: Track | None) -> Track | None:

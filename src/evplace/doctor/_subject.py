@@ -13,7 +13,6 @@ from evplace.core.compiled import njit
 from evplace.core.events import Events, Size
 from evplace.doctor._silences import Silences
 from evplace.imaging.windows import WindowSettings
-from evplace.sources.cleaning import count_pixels
 from evplace.sources.readers import Recording
 from evplace.sources.tracks import Track
 
@@ -21,7 +20,15 @@ BIN_US = 100_000
 """Events are counted in each tenth of a second."""
 _LONGEST = 1 << 23
 """Bins that are laid out at most, nine days: a clock that leaps a year ahead must not cost all memory."""
-
+SOON_US = 1000
+"""A pixel whose last event is less than so long ago repeats itself."""
+STAMP_BITS = 32
+"""A pixel is one number, its count above so many bits of its last time: what is far apart in memory costs
+more than all else."""
+STAMPS_US = 1 << 30
+"""After so long stamps begin anew."""
+AGO_US = 1 << 20
+"""Times are known up to so long before that."""
 REACH_US = 500_000
 """Activity is averaged over so long before and after."""
 
@@ -83,13 +90,21 @@ class Subject:
     t_last_us: int = 0
     rates: Rates = field(default_factory=Rates)
     silences: Silences = field(default_factory=Silences)
-    counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), np.int64))
-    """(H, W) events of each pixel."""
+    twice: int = 0
+    """Events that equal the one before them of their pixel."""
+    soon: int = 0
+    """Others that come within SOON_US of it."""
     motion: list[tuple[int, float]] = field(default_factory=list)
     """For a film: the time between two frames, and the image's motion in pixels a second."""
 
     def __post_init__(self) -> None:
-        self.counts = np.zeros((self.size[1], self.size[0]), np.int64)
+        self._pixels = np.zeros((self.size[1], self.size[0]), np.int64)
+        self._begin = np.full(1, -1 << 62)
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """(H, W) events of each pixel."""
+        return self._pixels >> STAMP_BITS
 
     @property
     def span_s(self) -> float:
@@ -101,7 +116,9 @@ class Subject:
         self._tick(int(events.t_us[0]), int(events.t_us[-1]), len(events))
         self.rates.push(events.t_us)
         self.silences.push(events.t_us)
-        count_pixels([events], self.size, self.counts)
+        found = np.zeros(2, np.int64)
+        _see_pixels(events.t_us, events.x, events.y, events.p, self._pixels, self._begin, found)
+        self.twice, self.soon = self.twice + int(found[0]), self.soon + int(found[1])
 
     def see_frame(self, t_us: int) -> None:
         """Note the next frame."""
@@ -191,3 +208,43 @@ def _runs(t_us: NDArray[np.int64], start_us: int, bin_us: int) -> tuple[NDArray[
             end_us = start_us + (numbers[at] + 1) * bin_us
         counts[at] += 1
     return numbers, counts
+
+
+@njit(cache=True)
+def _see_pixels(
+    t_us: NDArray[np.int64],
+    x: NDArray[np.uint16],
+    y: NDArray[np.uint16],
+    p: NDArray[np.bool_],
+    pixels: NDArray[np.int64],
+    begin: NDArray[np.int64],
+    found: NDArray[np.int64],
+) -> None:
+    """Count each pixel's events, and add to `found` those that come twice, and soon.
+
+    A pixel's stamp is its last time since begin[0] - AGO_US, doubled, and one more where it became brighter;
+    0 where that was earlier.
+    """
+    for i in range(len(t_us)):
+        since = t_us[i] - begin[0]
+        if since >= STAMPS_US:
+            _stamp_anew(pixels, since)
+            begin[0], since = t_us[i], 0
+        now = since + AGO_US << 1 | np.int64(p[i])
+        pixel = pixels[y[i], x[i]]
+        before = pixel & (1 << STAMP_BITS) - 1
+        pixels[y[i], x[i]] = pixel - before + (1 << STAMP_BITS) + now
+        if now == before:
+            found[0] += 1
+        elif (now >> 1) - (before >> 1) < SOON_US:
+            found[1] += 1
+
+
+@njit(cache=True)
+def _stamp_anew(pixels: NDArray[np.int64], later_us: int) -> None:
+    """Stamps count from so much later."""
+    for row in range(pixels.shape[0]):
+        for column in range(pixels.shape[1]):
+            stamp = pixels[row, column] & (1 << STAMP_BITS) - 1
+            new = stamp - (later_us << 1) if stamp >> 1 > later_us else 0
+            pixels[row, column] += new - stamp

@@ -43,11 +43,13 @@ class Check(AtTheEnd):
         track = self._subject.track
         if track is None:
             return Outcome()
-        findings = [_quality(track), *_log(track)]
-        if len(track) < 2:
-            return Outcome([*findings, _covered(self._subject, track)])
-        findings += [_gaps(track), _jumps(track), _repeated(track), _covered(self._subject, track)]
-        return Outcome(findings)
+        return Outcome([*of_track(track), _covered(self._subject, track)])
+
+
+def of_track(track: Track) -> list[Finding]:
+    """What a log says of itself, without a recording."""
+    findings = [_quality(track), *_log(track)]
+    return findings if len(track) < 2 else [*findings, _gaps(track), _jumps(track), _repeated(track)]
 
 
 def _quality(track: Track) -> Finding:

@@ -21,6 +21,7 @@ from evplace.core.errors import (
     UnsupportedError,
 )
 from evplace.core.events import Size
+from evplace.core.folders import TRAVERSE, instead, mark_of
 from evplace.core.settings import make, to_dict
 from evplace.drives import datasets
 from evplace.drives._recorded import GoodPart, RecordedImages, StorePlace
@@ -128,6 +129,8 @@ def open_source(
             of_any,
         )
         return datasets.open_drive(place, drive, dataset)
+    if is_folder and mark_of(place) is not None:
+        _refuse_own(place)
     if is_video(place):
         _refuse(f"{place} is a video, which has its own size and times", of_any)
         return Drive(open_film(place), simulate=True)
@@ -136,6 +139,8 @@ def open_source(
             _refuse(f"{images} holds images, which have their own size", of_recordings)
             return Drive(_listed_film(images, listing, fps, time_unit))
     _refuse(f"{place} is no folder of images", of_images)
+    if is_folder:
+        _refuse_own(place)
     return Drive(_recording(place, size, time_unit, stream, columns))
 
 
@@ -329,6 +334,16 @@ def _check_kind(kind: Kind | None, path: str, settings: Mapping[str, Any], inste
         mean, it = ("means", "it") if len(idle) == 1 else ("mean", "them")
         named = " and ".join(f"`{name}`" for name in idle)
         raise SettingsError(f"{named} {mean} nothing for the {what} of {path}: leave {it} out{instead}")
+
+
+def _refuse_own(folder: Path) -> None:
+    """TraverseError for a folder that evplace wrote and that is no drive, or that holds some."""
+    if mark_of(folder) == TRAVERSE:
+        raise TraverseError(
+            f"{folder} is a traverse, images that are made already: give the recording or film they are of"
+        )
+    if (told := instead(folder, TRAVERSE)) is not None:
+        raise TraverseError(told)
 
 
 def _refuse(what: str, arguments: Mapping[str, object]) -> None:

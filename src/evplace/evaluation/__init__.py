@@ -36,6 +36,7 @@ from evplace.evaluation._measures import (
 )
 from evplace.evaluation._result import MARK, OUTCOMES, Result
 from evplace.evaluation._samples import ItemImages, Samples, choose, pictures
+from evplace.evaluation._similarity import similarities
 from evplace.evaluation.truth import Truth
 from evplace.matchers import Path as Answers
 
@@ -69,17 +70,22 @@ def measure(
     settings: Mapping[str, Any] | None = None,
     query_xy: ArrayLike | None = None,
     delay: int | None = None,
+    hits: Floats | None = None,
 ) -> Result:
     """The figures of a matcher's `answers` (queries) by `truth`.
 
-    `scores` (queries, items) adds recall@N; `positions` (items, 2) in metres adds the gallery spacing;
-    `t_us` (queries,), `settings` and the positions, also `query_xy` (queries, 2), are kept with the result;
-    so is `delay`, how many images later an answer was known at most. Queries that the truth knows nothing of
-    are left out and counted. Raises EvaluationError where the parts do not fit or no query is judged.
+    `scores` (queries, items) adds recall@N, and so do their `hits` (queries, N, 3) of `hits_at` in their
+    place; `positions` (items, 2) in metres adds the gallery spacing; `t_us` (queries,), `settings` and the
+    positions, also `query_xy` (queries, 2), are kept with the result; so is `delay`, how many images later an
+    answer was known at most. Queries that the truth knows nothing of are left out and counted. Raises
+    EvaluationError where the parts do not fit or no query is judged.
     """
     _check(answers, truth, scores)
     here, there = _known(query_xy, truth.n_queries), _known(positions, truth.n_items)
-    right, true_item, shares, ranked = _compare_with_truth(answers, truth, scores, here, there)
+    right, true_item, shares, ranked = _compare_with_truth(
+        answers, truth, scores if hits is None else None, here, there
+    )
+    ranked = ranked if hits is None else hits
     seen = true_item >= 0
     accepted = answers.accepted & (answers.item >= 0)
     judged = truth.judged
@@ -102,6 +108,7 @@ def measure(
     return Result(
         figures, resolved, versions(), answers, times, judged, seen, right, curve, scores,
         true_item=true_item, query_xy=here, item_xy=there,
+        similarity=None if scores is None else similarities(scores),
     )  # fmt: skip
 
 
@@ -183,8 +190,11 @@ def _nearest_right(block: Bools, here: Floats | None, there: Floats | None) -> N
         place = np.cumsum(block, axis=1)
         nearest = np.argmax(place > (place[:, -1:] - 1) // 2, axis=1)
     else:
-        apart = np.hypot(here[:, 0, None] - there[:, 0], here[:, 1, None] - there[:, 1])
-        nearest = np.argmin(np.where(block & np.isfinite(apart), apart, np.inf), axis=1)
+        apart = np.full(block.shape, np.inf)
+        query, item = np.nonzero(block)  # few: the distances to all others are not needed
+        metres = np.hypot(*(here[query] - there[item]).T)
+        apart[query, item] = np.where(np.isfinite(metres), metres, np.inf)
+        nearest = np.argmin(apart, axis=1)
     return np.where(block.any(axis=1), nearest, -1)
 
 

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core import storage
+from evplace.core import folders, storage
 from evplace.core.errors import EvaluationError, InputError
 from evplace.evaluation._measures import CURVE, Bools, Floats
 from evplace.evaluation._samples import Samples
 from evplace.matchers import Path as Answers
 
-MARK = "pr_curve.npy"
+MARK = folders.RESULT
 """What tells a folder that was written here from any other: only such a one is replaced."""
 _MATCHES = ("query", "t_us", "item", "score", "accepted", "judged", "seen", "right", "true_item")
 _NEEDED = ("queries", "left_out", "items", "judged", "accuracy", "accuracy_seen", "average_precision")
@@ -59,6 +59,8 @@ class Result:
     """(queries, 2) easting and northing in metres, NaN where unknown; None where none is known."""
     item_xy: Floats | None = None
     """(items, 2) easting and northing in metres, NaN where unknown; None where none is known."""
+    similarity: NDArray[np.uint8] | None = None
+    """(at most 320, at most 240) how far items stand out for some queries, to look at."""
     took_s: float | None = None
     """Seconds of localising and measuring."""
     samples: Samples | None = None
@@ -93,7 +95,7 @@ class Result:
 
     def save(self, path: str | Path, overwrite: bool = False, with_scores: bool = False) -> None:
         """A folder: result.json, matches.csv, pr_curve.npy, and as far as they are known query_xy.npy,
-        item_xy.npy and samples.npy.
+        item_xy.npy, similarity.npy and samples.npy.
 
         `with_scores` adds scores.npy. Raises OutputError where the folder cannot be written.
         """
@@ -106,6 +108,7 @@ class Result:
                 "item_xy": self.item_xy,
                 "samples": self.samples.images if self.samples is not None else None,
                 "scores": self.scores if with_scores else None,
+                "similarity": self.similarity,
             }
             for name, array in arrays.items():
                 if array is not None:
@@ -115,6 +118,8 @@ class Result:
     def load(cls, path: str | Path) -> Result:
         """The result in a folder; EvaluationError where it is none or damaged."""
         folder = Path(path)
+        if not (folder / MARK).exists() and (told := folders.instead(folder, MARK)) is not None:
+            raise EvaluationError(told)
         try:
             what = f"the result in {folder}"
             summary = storage.read_json(folder / "result.json", what)
@@ -127,7 +132,7 @@ class Result:
                 summary["figures"], summary["settings"], summary["versions"], answers, **columns,
                 curve=curve, scores=_kept(folder / "scores.npy", memory_mapped=True),
                 query_xy=_kept(folder / "query_xy.npy"), item_xy=_kept(folder / "item_xy.npy"),
-                took_s=summary.get("took_s"), samples=samples,
+                similarity=_kept(folder / "similarity.npy"), took_s=summary.get("took_s"), samples=samples,
             )  # fmt: skip
             _check_fit(result)
         except InputError as error:
@@ -192,6 +197,9 @@ def _check_fit(result: Result) -> None:
     ):
         if array is not None and (array.shape != shape or array.dtype not in (np.float64, np.float32)):
             raise ValueError(f"its {name} are {array.dtype} {array.shape} in place of floats {shape}")
+    shown = result.similarity
+    if shown is not None and (shown.ndim != 2 or shown.dtype != np.uint8 or not shown.size):
+        raise ValueError(f"its similarity is {shown.dtype} {shown.shape} in place of uint8 in two dimensions")
     if result.samples is not None and np.any(result.samples.query >= queries):
         raise ValueError(f"samples of queries beyond the {queries}")
 

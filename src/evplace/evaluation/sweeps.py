@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from evplace.core import settings
-from evplace.localizer import Answers
+from evplace.localizer import BLOCK, Answers
 from evplace.matchers import Judge, Matcher, Path, Rows, stepped
 
 
@@ -47,7 +47,8 @@ def _run(matcher: Matcher, scores: Rows, distances: bool, answers: Answers) -> P
     matching = matcher.start(distances)
     if answers == "live" and not matcher.causal:
         return stepped(matching.step, scores)[0]
-    matching.extend(scores)
+    for start in range(0, len(scores), BLOCK):
+        matching.extend(scores[start : start + BLOCK])
     return matching.path()
 
 

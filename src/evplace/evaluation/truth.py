@@ -29,8 +29,8 @@ Bools = NDArray[np.bool_]
 Block = Callable[[slice], Bools]
 """Queries -> (those queries, items) right answers."""
 
-_BLOCK_CELLS = 1 << 22
-"""Queries x items looked at in one go."""
+_BLOCK_CELLS = 1 << 18
+"""Queries x items looked at in one go: as many as the processor's cache holds."""
 
 
 @dataclass(frozen=True, eq=False)

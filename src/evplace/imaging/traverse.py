@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core import folders
 from evplace.core.errors import InputError, OutputError, SettingsError, TraverseError
 from evplace.core.storage import GrowingArray, new_folder, read_array, read_json, write_array, write_json
 from evplace.imaging.recipe import Recipe
@@ -24,7 +25,7 @@ from evplace.sources.tracks import Track
 FORMAT = "evplace-traverse-2"
 OLD_FORMAT = "evplace-traverse-1"
 """Its recipe lies in pieces in `info`."""
-MARK = "traverse.json"
+MARK = folders.TRAVERSE
 """What tells a folder that was written here from any other: only such a one is replaced."""
 
 

@@ -148,6 +148,11 @@ class Route(NamedTuple):
     """What the map's images usually show, as in Seen."""
     learned: Learned | None = None
     """What `learn` has given for this map; None where it was not asked."""
+    own: Sequence[NDArray[np.int64]] | None = None
+    """The item of each of the images that `learn` may ask rows of, for each drive of the map, one behind the
+    other; None where these are the items' own, one each, and a row also says how like itself an image is."""
+    left_out: int = 0
+    """Items of the map that these are not all of; then rows are z-scores by all of them."""
 
 
 class Following(Protocol):
@@ -161,17 +166,36 @@ class Following(Protocol):
 
 
 @runtime_checkable
+class Continuing(Following, Protocol):
+    """A Following that goes on where the drive comes to another part of the map."""
+
+    def continued(self, route: Route, came_from: NDArray[np.int64]) -> Following:
+        """On other items of the same map; `came_from` (items,) is the number of each so far, -1 of a new one.
+
+        Queries go on being numbered. See `Route.left_out` for rows of a part of a map.
+        """
+
+
+@runtime_checkable
 class RouteMatcher(Protocol):
     """A Matcher that also uses where a map's items are, and when and how much a query saw."""
 
     def learn(self, route: Route, rows: Callable[[slice], Rows]) -> Learned:
-        """What the map's own images tell; `rows` gives the score rows of some of its items' own images."""
+        """What the map's own images tell; `rows` gives the score rows of some of them: see Route.own."""
 
     def follow(self, route: Route, distances: bool = False) -> Following:
         """Begin a traverse."""
 
     def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
         """The answers for all queries of a traverse, once all are known."""
+
+
+@runtime_checkable
+class LearnsMore(Protocol):
+    """A RouteMatcher that need not learn a map anew where some images come to it."""
+
+    def learn_more(self, before: Learned, route: Route, rows: Callable[[slice], Rows]) -> Learned:
+        """As `learn`, of the images that are new; `before` is what it has learned of the others."""
 
 
 class Sweep(NamedTuple):
@@ -216,8 +240,9 @@ def open_matcher(
 from evplace.matchers._rows import Answers, RowCheck  # noqa: E402 - they are made of what stands above
 
 __all__ = [
-    "Answer", "Answers", "Estimate", "Following", "Judge", "Learned", "Matcher", "Matching", "Path", "Route",
-    "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep", "open_matcher", "stepped",
+    "Answer", "Answers", "Continuing", "Estimate", "Following", "Judge", "Learned", "LearnsMore", "Matcher",
+    "Matching", "Path", "Route", "RouteMatcher", "Row", "RowCheck", "Rows", "Seen", "State", "Sweep",
+    "open_matcher", "stepped",
 ]  # fmt: skip
 
 

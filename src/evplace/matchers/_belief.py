@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,17 +82,34 @@ class Filter:
         loops.share_out(self.belief, self.belief.sum(), marginal)
         return marginal
 
+    def go_on(self, before: Filter, came_from: NDArray[np.int64]) -> None:
+        """From a filter over other items of the map; `came_from` as in `Continuing`.
+
+        What was believed of items that are no longer here may be anywhere.
+        """
+        self.belief = taken(before.belief, came_from)
+        self.belief += (1 - self.belief.sum()) / self.belief.size
+        self.evidence, self.moved_s = taken(before.evidence, came_from), before.moved_s
+
     @property
     def moment(self) -> Moment:
         """What is to be kept of the images since the last move."""
         return Moment(self.belief.astype(np.float32), self.evidence, self.moved_s)
 
 
+def taken(values: NDArray[Any], came_from: NDArray[np.int64]) -> NDArray[Any]:
+    """(items, ...) the values of items by where they were; 0 of new ones."""
+    new = np.zeros((len(came_from), *values.shape[1:]), values.dtype)
+    known = came_from >= 0
+    new[known] = values[came_from[known]]
+    return new
+
+
 def moved(belief: Floats, ways: Ways, seconds: float, other: Floats) -> Floats:
     """(references, speeds) a belief after so many seconds of driving: it is `other`; `belief` is used up."""
     ticks = min(seconds / TICK_S, 1.0)
     loops.mix_speeds(belief, CHANGE * ticks, other)
-    loops.move(other, ways.way, SPEEDS * ways.pace * seconds, belief)
+    loops.move(other, ways.way, SPEEDS * ways.pace * seconds, belief, np.empty(len(SPEEDS), np.uint64))
     loops.pass_links(belief, *ways.links, LINK * ticks, other)
     kept = other.sum() * (1 - JUMP * ticks)
     loops.level(other, 1 - JUMP * ticks, (1 - kept) / other.size)

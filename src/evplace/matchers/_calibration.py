@@ -18,11 +18,12 @@ from evplace.matchers import Learned, Route, Rows, Seen
 from evplace.matchers import _surroundings as around
 from evplace.matchers import _traces as traces
 from evplace.matchers._belief import CONTENT, WRONG
-from evplace.matchers._known import of_drive, probability
+from evplace.matchers._known import of_late, of_live, probability
 from evplace.matchers._ways import Ways
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Ints = NDArray[np.int64]
 
 LIVE, LATE = "unknown_live", "unknown_late"
 """Probabilities, sorted, at places cut out: live, and when what comes later is known."""
@@ -44,6 +45,8 @@ TRIED = 6000
 """Images that are localised in all trials, about."""
 MOST_IMAGES = 3000
 """Of the map's own, that are localised on it: the first ones of a longer map."""
+MOST_SCORES = 20_000_000
+"""From which the density of wrong scores is made; of more, every second, third ... is taken."""
 
 
 class Strangers(NamedTuple):
@@ -69,24 +72,39 @@ def measured(route: Route, rows: Callable[[slice], Rows]) -> Learned:
     }
 
 
+def together(before: Learned, more: Learned) -> Learned:
+    """What was measured of a map, and of some more of it; each counts by its images from places cut out."""
+    if not more:
+        return before
+    many = np.array([len(one[LIVE]) for one in (before, more)]) / (len(before[LIVE]) + len(more[LIVE]))
+    wrong = np.log(many @ np.exp(np.stack([before[WRONG], more[WRONG]])))
+    content = many @ np.stack([before[CONTENT], more[CONTENT]])
+    both = {name: np.sort(np.concatenate([before[name], more[name]])) for name in (LIVE, LATE)}
+    return {WRONG: wrong, CONTENT: content, **both}
+
+
 def strangers(route: Route, rows: Callable[[slice], Rows]) -> Strangers | None:
     """Localise a map's images on what is left of it; None for a map too short or too small for that."""
     ways = Ways.of(route)
     items = len(ways.way)
     if items < LEAST_ITEMS or ways.way[-1] < SHORTEST_M:
         return None
-    queries = min(items, MOST_IMAGES)
-    own = np.array(rows(slice(0, queries)), np.float32)
-    own[np.arange(queries), np.arange(queries)] = own.min(axis=1)  # an image tells nothing of itself
-    learned = {WRONG: _wrong(ways, own), CONTENT: np.array([route.content])}
-    unknown = [_trial(route, own, learned, keep) for keep in _cuts(ways)]
+    drives = [np.arange(min(items, MOST_IMAGES))] if route.own is None else route.own
+    at = np.concatenate(drives)
+    own = np.array(rows(slice(0, len(at))), np.float32)
+    if route.own is None:
+        own[at, at] = own.min(axis=1)  # an image tells nothing of itself
+    learned = {WRONG: _wrong(ways, own, at), CONTENT: np.array([route.content])}
+    each = list(zip(drives, np.split(own, np.cumsum([len(drive) for drive in drives])[:-1]), strict=True))
+    unknown = [_trial(route, ways, *one, learned, keep) for keep in _cuts(ways) for one in each]
     live, late = (np.concatenate(column) for column in zip(*unknown, strict=True))
     return None if len(live) < LEAST_UNKNOWN else Strangers(learned, live, late)
 
 
-def _wrong(ways: Ways, own: Rows) -> Floats:
+def _wrong(ways: Ways, own: Rows, at: Ints) -> Floats:
     """The density of z-scores of other places."""
-    scores = [robust_z(row)[_elsewhere(ways, query)] for query, row in enumerate(own)]
+    every = -(-own.size // MOST_SCORES)
+    scores = [robust_z(row)[_elsewhere(ways, item)][::every] for row, item in zip(own, at, strict=True)]
     return around.density(np.concatenate(scores).astype(np.float64))
 
 
@@ -105,15 +123,17 @@ def _cuts(ways: Ways) -> Iterator[Bools]:
         yield (np.searchsorted(ends, ways.way, "right") + trial) % 2 == 0
 
 
-def _trial(route: Route, own: Rows, learned: Learned, keep: Bools) -> tuple[Floats, Floats]:
-    """(unknown, features) live and late, of those of a map's images whose places are cut out."""
-    whole, part = Ways.of(route), Ways.of(_part(route, keep))
-    seen, rows = _driven(whole, len(own)), own[:, keep]
-    unknown = np.array([not _near(whole, keep, query) for query in range(len(own))])
+def _trial(
+    route: Route, whole: Ways, at: Ints, own: Rows, learned: Learned, keep: Bools
+) -> tuple[Floats, Floats]:
+    """(unknown, features) live and late, of those of a drive's images whose places are cut out."""
+    part = Ways.of(_part(route, keep))
+    seen, rows = _driven(whole, at), own[:, keep]
+    unknown = np.array([not _near(whole, keep, item) for item in at])
     live, late = traces.live(part, rows, seen, learned), traces.late(part, rows, seen, learned)
     return (
-        of_drive(live.signs, live.weight, late=False)[unknown],
-        of_drive(late.signs, late.weight, late=True)[unknown],
+        of_live(live.signs, live.weight)[unknown],
+        of_late(late.signs, late.live, late.weight)[unknown],
     )
 
 
@@ -122,15 +142,16 @@ def _part(route: Route, keep: Bools) -> Route:
     return Route(route.position[keep], route.heading_deg[keep], times)
 
 
-def _near(whole: Ways, keep: Bools, query: int) -> bool:
-    """Whether the map still has a place that an image may look like: its own, or what lies ahead of it."""
-    turn = np.abs((whole.heading_deg - whole.heading_deg[query] + 180) % 360 - 180)
-    return bool((keep & (whole.away(query) <= NEAR_M) & ~(turn > LIKE_DEG)).any())
+def _near(whole: Ways, keep: Bools, item: int) -> bool:
+    """Whether the map still has a place that an item's image may look like: its own, or what lies ahead."""
+    turn = np.abs((whole.heading_deg - whole.heading_deg[item] + 180) % 360 - 180)
+    return bool((keep & (whole.away(item) <= NEAR_M) & ~(turn > LIKE_DEG)).any())
 
 
-def _driven(ways: Ways, images: int) -> list[Seen]:
-    """The map's own images as a drive at its usual pace."""
-    t_us = np.concatenate([[0.0], np.cumsum(np.minimum(np.diff(ways.way[:images]) / ways.pace, 1.0))]) * 1e6
+def _driven(ways: Ways, at: Ints) -> list[Seen]:
+    """Images at some items, in their order, as a drive at the map's usual pace."""
+    steps = np.abs(np.diff(ways.way[at])) / ways.pace
+    t_us = np.concatenate([[0.0], np.cumsum(np.minimum(steps, 1.0))]) * 1e6
     return [Seen(int(one), np.nan) for one in t_us]
 
 

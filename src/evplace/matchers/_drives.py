@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from evplace.matchers import Answer, Following, Matcher, Matching, Path, Route, RouteMatcher, Row, Rows, Seen
+from evplace.matchers import Answer, Following, Matcher, Matching, Route, RouteMatcher, Row, Seen
 
 
 class _OnRowsAlone:
@@ -28,12 +26,3 @@ def follow(matcher: Matcher, route: Route, distances: bool) -> Following:
     if isinstance(matcher, RouteMatcher):
         return matcher.follow(route, distances)
     return _OnRowsAlone(matcher.start(distances))
-
-
-def in_hindsight(matcher: Matcher, route: Route, distances: bool, rows: Rows, seen: Sequence[Seen]) -> Path:
-    """The answers for all queries of a traverse, once all are known."""
-    if isinstance(matcher, RouteMatcher):
-        return matcher.in_hindsight(route, rows, seen)
-    matching = matcher.start(distances)
-    matching.extend(rows)
-    return matching.path()

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import InputError
+from evplace.core.tables import empty_rows
 from evplace.matchers import Path
 
 LIVE_BYTES = 1 << 26
@@ -110,8 +111,14 @@ class Kept:
         return (row for block in reversed(self._blocks) for row in self._read(block)[::-1])
 
     def table(self) -> NDArray[Any]:
-        """All rows that are still here as one array."""
-        return np.concatenate([self._read(block) for block in self._blocks])
+        """All rows (queries, items) that are still here as one array, which may lie in a file."""
+        first = self._blocks[0]
+        found = empty_rows(self._queries - self.first, first.shape[1], first.dtype)
+        at = 0
+        for block in self._blocks:
+            found[at : at + len(block)] = self._read(block)
+            at += len(block)
+        return found
 
 
 def after(forgotten: int, path: Path) -> Path:

@@ -4,7 +4,8 @@ Four signs of each answer are averaged over the images before it, and where the 
 these too: how like the reference is, how far it leads over other places, whether the single image agrees with
 the sequence, and how sure the filter is. Scores come as robust z-scores, which mean the same on any map and
 by any light; so one set of weights serves all. They are fitted on drives through other towns than the
-benchmark's (`evplace reproduce known`).
+benchmark's (`evplace reproduce known`). What was said of an image live counts half beside what is said of it
+later: by a light that is strange to the later weights it holds up better.
 """
 
 from __future__ import annotations
@@ -94,10 +95,15 @@ def joined(before: Floats, ahead: Floats) -> Floats:
     return np.concatenate(sides, axis=-1)
 
 
-def of_drive(signs: Floats, weights: Floats, late: bool) -> Floats:
-    """(n, features) what the weights are of, for all answers (n, SIGNS) of a drive."""
-    before = means_of(signs, weights, SPANS)
-    return joined(before, means_ahead(signs, weights)) if late else before
+def of_live(signs: Floats, weights: Floats) -> Floats:
+    """(n, features) what the weights are of, for all live answers (n, SIGNS) of a drive."""
+    return np.asarray(means_of(signs, weights, SPANS), np.float64)
+
+
+def of_late(signs: Floats, live: Floats, weights: Floats) -> Floats:
+    """(n, features) the same of late answers (n, SIGNS), of images whose `live` ones had their own signs."""
+    sides = joined(of_live(signs, weights), means_ahead(signs, weights))
+    return np.concatenate([sides, of_live(live, weights)], axis=1)
 
 
 def probability(features: Floats) -> Floats:

@@ -35,13 +35,14 @@ def mix_speeds(belief: Belief, change: float, out: Belief) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def move(belief: Belief, way: Floats, steps: Floats, out: Belief) -> None:
+def move(belief: Belief, way: Floats, steps: Floats, out: Belief, at: NDArray[np.uint64]) -> None:
     """Each class v moves on by steps[v] along the way (references,); what passes the end is lost.
 
-    Between two references it is shared by nearness. All classes go along the way together: one pass.
+    Between two references it is shared by nearness. All classes go along the way together: one pass, `at`
+    (speeds,) being where each has come to.
     """
     last = np.uint64(len(way) - 1)
-    at = np.zeros(len(steps), np.uint64)
+    at[:] = 0
     out[:] = 0.0
     for r in range(len(way)):
         for v in range(len(steps)):
@@ -80,20 +81,17 @@ def pass_links(
     belief: Belief, first: NDArray[np.int64], to: NDArray[np.int64], share: float, out: Belief
 ) -> None:
     """A share of each linked reference's belief goes to its links, equally."""
-    speeds = belief.shape[1]
-    part = np.empty(speeds)
-    out[:] = belief
+    for r in range(belief.shape[0]):
+        for v in range(belief.shape[1]):
+            out[r, v] = belief[r, v]
     for r in range(belief.shape[0]):
         many = first[r + 1] - first[r]
-        if many == 0:
-            continue
-        for v in range(speeds):
-            part[v] = share * belief[r, v] / many
         for k in range(first[r], first[r + 1]):
             there = out[to[k]]
-            for v in range(speeds):
-                out[r, v] -= part[v]
-                there[v] += part[v]
+            for v in range(belief.shape[1]):
+                part = share * belief[r, v] / many
+                out[r, v] -= part
+                there[v] += part
 
 
 @njit(cache=True, nogil=True)
@@ -131,11 +129,10 @@ def weigh(belief: Belief, evidence: Floats, cell: NDArray[np.int32], says: Float
 @njit(cache=True, nogil=True, error_model="numpy")
 def share_out(belief: Belief, total: float, out: Floats) -> None:
     """Divide the belief by its total; `out` gets that of each reference, its eight classes in pairs."""
-    flat = belief.reshape(-1)
-    for i in range(flat.size):
-        flat[i] /= total
     for r in range(belief.shape[0]):
         b = belief[r]
+        for v in range(belief.shape[1]):
+            b[v] /= total
         out[r] = ((b[0] + b[1]) + (b[2] + b[3])) + ((b[4] + b[5]) + (b[6] + b[7]))
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from itertools import chain
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from evplace.core.zscores import robust_z
 from evplace.matchers import Learned, Rows, Seen
 from evplace.matchers._answering import Reader
 from evplace.matchers._belief import WRONG, Clock, Filter, Moment, clock_of, smoothed
+from evplace.matchers._kept import Kept
 from evplace.matchers._known import SIGNS
 from evplace.matchers._ways import Ways
 
@@ -44,6 +46,8 @@ class Trace(NamedTuple):
     """(queries,) the answers."""
     signs: Floats
     """(queries, SIGNS) see `_known`."""
+    live: Floats
+    """(queries, SIGNS) those of what is said live."""
     weight: Floats
     """(queries,) how much each image counts."""
 
@@ -51,7 +55,8 @@ class Trace(NamedTuple):
 def live(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
     """Each answer from the images up to it; `learned` is what the map has told."""
     filter_, reader, clock = Filter(ways, learned.get(WRONG)), Reader(ways), clock_of(learned)
-    out = Trace(np.zeros(len(rows), np.int64), np.zeros((len(rows), SIGNS)), np.zeros(len(rows)))
+    signs = np.zeros((len(rows), SIGNS))
+    out = Trace(np.zeros(len(rows), np.int64), signs, signs, np.zeros(len(rows)))
     for query, (row, one) in enumerate(zip(rows, seen, strict=True)):
         z = robust_z(row)
         out.weight[query], driven_s = clock.see(one)
@@ -65,12 +70,13 @@ def live(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trac
 def late(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
     """Each answer from all images of the drive."""
     drive, wrong = _Drive(seen, clock_of(learned)), learned.get(WRONG)
-    out = Trace(np.zeros(len(rows), np.int64), np.zeros((len(rows), SIGNS)), drive.weight)
+    signs, said = (np.zeros((len(rows), SIGNS)) for _ in range(2))
+    out = Trace(np.zeros(len(rows), np.int64), signs, said, drive.weight)
     starts = _beliefs_at_blocks(ways, rows, drive, wrong)
     reader, message = Reader(ways), None
-    for block in range(len(starts) - 1, -1, -1):
+    for block, start in zip(range(len(starts), -1, -1), chain(starts.backwards(), [None]), strict=True):
         numbers = range(block * BLOCK, min((block + 1) * BLOCK, len(drive.begins)))
-        moments = _moments(ways, rows, drive, wrong, numbers, starts[block])
+        moments = _moments(ways, rows, drive, wrong, numbers, start, said)
         beliefs, message = smoothed(moments, ways, message)
         for number, belief in zip(numbers, beliefs, strict=True):
             for query in range(drive.begins[number], drive.ends[number]):
@@ -79,27 +85,36 @@ def late(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trac
     return out
 
 
-def _beliefs_at_blocks(ways: Ways, rows: Rows, drive: _Drive, wrong: Floats | None) -> list[Floats | None]:
-    """The belief before each block of moments; None before the first."""
-    starts: list[Floats | None] = [None]
+def _beliefs_at_blocks(ways: Ways, rows: Rows, drive: _Drive, wrong: Floats | None) -> Kept:
+    """The belief before each block of moments but the first, before which there is none."""
+    starts, last = Kept(), None
     for first in range(BLOCK, len(drive.begins), BLOCK):
         numbers = range(first - BLOCK, first)
-        last = _moments(ways, rows, drive, wrong, numbers, starts[-1])[-1]
-        starts.append(last.belief.astype(np.float64))
+        last = _moments(ways, rows, drive, wrong, numbers, last)[-1].belief
+        starts.append(last[None])
     return starts
 
 
 def _moments(
-    ways: Ways, rows: Rows, drive: _Drive, wrong: Floats | None, numbers: range, start: Floats | None
+    ways: Ways,
+    rows: Rows,
+    drive: _Drive,
+    wrong: Floats | None,
+    numbers: range,
+    start: NDArray[np.floating[Any]] | None,
+    said: Floats | None = None,
 ) -> list[Moment]:
-    """The moments of some numbers, from the belief before them."""
-    filter_, out = Filter(ways, wrong), []
+    """The moments of some numbers, from the belief before them; `said` gets the signs of live answers."""
+    filter_, reader, out = Filter(ways, wrong), Reader(ways), []
     if start is not None:
-        filter_.belief = start.copy()
+        filter_.belief = start.astype(np.float64)
     for number in numbers:
         if number:
             filter_.move(drive.driven_s[number])
         for query in range(drive.begins[number], drive.ends[number]):
-            filter_.see(robust_z(rows[query]), drive.weight[query])
+            z = robust_z(rows[query])
+            belief = filter_.see(z, drive.weight[query])
+            if said is not None:
+                said[query] = reader.find(belief, z).signs
         out.append(filter_.moment)
     return out

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -122,15 +121,26 @@ def _pace(route: Route, steps: Floats) -> float:
 
 def _links(xy: Floats, heading_deg: Floats, way: Floats) -> Links:
     """Pairs that lie within BESIDE_M, look the same way, and are more than APART_M apart along the way."""
-    cells: dict[tuple[int, int], list[int]] = defaultdict(list)
-    where = np.floor(xy / BESIDE_M).astype(np.int64).tolist()
-    for item, (column, row) in enumerate(where):
-        cells[column, row].append(item)
-    lists: list[Ints] = []
-    for item, (column, row) in enumerate(where):
-        around = [j for dc in (-1, 0, 1) for dr in (-1, 0, 1) for j in cells.get((column + dc, row + dr), ())]
-        near = np.array(around, np.int64)
-        turn = np.abs((heading_deg[near] - heading_deg[item] + 180) % 360 - 180)
-        beside = _lengths(xy[near] - xy[item]) < BESIDE_M
-        lists.append(near[beside & (turn <= SAME_WAY_DEG) & (np.abs(way[near] - way[item]) > APART_M)])
-    return Links(np.cumsum([0, *map(len, lists)]), np.concatenate(lists))
+    items = np.arange(len(xy))
+    cells = np.floor(xy / BESIDE_M).astype(np.int64)
+    keys = _key(cells)
+    order = np.argsort(keys, kind="stable")
+    found: list[tuple[Ints, Ints]] = []
+    for step in [(column, row) for column in (-1, 0, 1) for row in (-1, 0, 1)]:
+        wanted = _key(cells + step)
+        first, last = (np.searchsorted(keys[order], wanted, side) for side in ("left", "right"))
+        many = last - first
+        one = np.repeat(items, many)
+        other = order[np.repeat(first - np.cumsum(many) + many, many) + np.arange(len(one))]
+        turn = np.abs((heading_deg[other] - heading_deg[one] + 180) % 360 - 180)
+        beside = (_lengths(xy[other] - xy[one]) < BESIDE_M) & (turn <= SAME_WAY_DEG)
+        beside &= np.abs(way[other] - way[one]) > APART_M
+        found.append((one[beside], other[beside]))
+    one, other = (np.concatenate(column) for column in zip(*found, strict=True))
+    first = np.searchsorted(np.sort(one), np.arange(len(xy) + 1))
+    return Links(first, other[np.argsort(one, kind="stable")])
+
+
+def _key(cells: Ints) -> Ints:
+    """(items,) one number for each column and row (items, 2)."""
+    return np.asarray(cells[:, 0] * (1 << 32) + cells[:, 1], np.int64)

@@ -38,10 +38,10 @@ from evplace.matchers import (
     Sweep,
 )
 from evplace.matchers._answering import Found, Reader
-from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed
-from evplace.matchers._calibration import LATE, LIVE, checked, measured
+from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed, taken
+from evplace.matchers._calibration import LATE, LIVE, checked, measured, together
 from evplace.matchers._kept import Kept, after, live_rows
-from evplace.matchers._known import Means, joined, means_ahead, of_drive, probability
+from evplace.matchers._known import Means, joined, means_ahead, of_late, probability
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
 from evplace.matchers._ways import Ways
@@ -81,6 +81,10 @@ class Bayes:
         """See RouteMatcher."""
         return measured(route, rows)
 
+    def learn_more(self, before: Learned, route: Route, rows: Callable[[slice], Rows]) -> Learned:
+        """See LearnsMore."""
+        return together(before, measured(route, rows))
+
     def follow(self, route: Route, distances: bool = False) -> Following:  # noqa: ARG002 - a distance is -d
         """See RouteMatcher."""
         return _Lagging(self, route) if self.lag_s else _Live(self, route)
@@ -88,7 +92,7 @@ class Bayes:
     def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
         """See RouteMatcher."""
         trace = late(Ways.of(route), rows, seen, checked(route.learned))
-        right = probability(of_drive(trace.signs, trace.weight, late=True))
+        right = probability(of_late(trace.signs, trace.live, trace.weight))
         return Path(trace.item, right, right > self._threshold(route, LATE))
 
     def start(self, distances: bool = False) -> Matching:  # noqa: ARG002 - a distance is -d
@@ -116,14 +120,16 @@ class _Live:
 
     def __init__(self, settings: Bayes, route: Route) -> None:
         learned = checked(route.learned)
+        self._settings = settings
         self._threshold, self._measured = settings._threshold(route, LIVE), LIVE in learned
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
-        self._reader = Reader(self._filter.ways)
+        self._reader, self._is_part = Reader(self._filter.ways, route.left_out), route.left_out > 0
         self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
 
     def step(self, row: Row, seen: Seen) -> list[Answer]:
         """See Following."""
-        z = robust_z(self._check(row[None])[0])
+        row = self._check(row[None])[0]
+        z = np.asarray(row, np.float32) if self._is_part else robust_z(row)
         weight, drive_s = self._clock.see(seen)
         if drive_s is not None:
             self._filter.move(drive_s)
@@ -136,6 +142,12 @@ class _Live:
         """See Following."""
         return []
 
+    def continued(self, route: Route, came_from: NDArray[np.int64]) -> _Live:
+        """See Continuing."""
+        other = _Live(self._settings, route)
+        _go_on(other, self, came_from)
+        return other
+
 
 class _Seen(NamedTuple):
     query: int
@@ -145,6 +157,8 @@ class _Seen(NamedTuple):
     standing: bool
     moment: int
     """Its number, of all moments so far."""
+    said: Floats
+    """What the weights of live answers are of."""
 
 
 class _Lagging:
@@ -152,32 +166,48 @@ class _Lagging:
 
     def __init__(self, settings: Bayes, route: Route) -> None:
         learned = checked(route.learned)
+        self._settings = settings
         self._threshold, self._measured = settings._threshold(route, LATE), LATE in learned
         self._lag_us = round(settings.lag_s * 1e6)
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
-        self._reader = Reader(self._filter.ways)
+        self._reader, self._is_part = Reader(self._filter.ways, route.left_out), route.left_out > 0
         self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
+        self._said = Means()
         self._waiting: deque[_Seen] = deque()
         self._moments: deque[Moment] = deque()
         self._moved = 0
 
     def step(self, row: Row, seen: Seen) -> list[Answer]:
         """See Following."""
-        z = robust_z(self._check(row[None])[0])
+        row = self._check(row[None])[0]
+        z = np.asarray(row, np.float32) if self._is_part else robust_z(row)
         weight, drive_s = self._clock.see(seen)
         if drive_s is not None:
             self._moments.append(self._filter.moment)
             self._filter.move(drive_s)
             self._moved += 1
-        self._filter.see(z, weight)
+        found = self._reader.find(self._filter.see(z, weight), z)
+        said = self._said.add(found.signs, weight)
         self._waiting.append(
-            _Seen(self._check.queries - 1, seen.t_us, z, weight, self._clock.standing, self._moved)
+            _Seen(self._check.queries - 1, seen.t_us, z, weight, self._clock.standing, self._moved, said)
         )
         return self._answers(sum(one.t_us <= seen.t_us - self._lag_us for one in self._waiting))
 
     def finish(self) -> list[Answer]:
         """See Following."""
         return self._answers(len(self._waiting))
+
+    def continued(self, route: Route, came_from: NDArray[np.int64]) -> _Lagging:
+        """See Continuing."""
+        other = _Lagging(self._settings, route)
+        _go_on(other, self, came_from)
+        other._moved, other._said = self._moved, self._said
+        other._waiting.extend(one._replace(z=taken(one.z, came_from)) for one in self._waiting)
+        other._moments.extend(
+            Moment(taken(one.belief, came_from), taken(one.evidence, came_from), one.moved_s)
+            for one in self._moments
+        )
+        return other
 
     def _answers(self, due: int) -> list[Answer]:
         """The first `due` of those that wait, each judged by all that is known."""
@@ -193,12 +223,19 @@ class _Lagging:
         for at in range(due):
             one = self._waiting.popleft()
             before = self._means.add(found[at].signs, one.weight)
-            right = float(probability(joined(before, ahead[at])))
+            right = float(probability(np.concatenate([joined(before, ahead[at]), one.said])))
             belief = beliefs[one.moment - first]
             answers.append(_answer(self, one.query, belief, found[at], right, one.standing))
         while self._waiting and self._waiting[0].moment > self._moved - len(self._moments):
             self._moments.popleft()
         return answers
+
+
+def _go_on(now: _Live | _Lagging, before: _Live | _Lagging, came_from: NDArray[np.int64]) -> None:
+    """Take over what does not depend on which items are compared, and the belief."""
+    now._filter.go_on(before._filter, came_from)
+    now._clock, now._means = before._clock, before._means
+    now._check.queries = before._check.queries
 
 
 def _answer(

@@ -3,7 +3,8 @@
 On disk it is a folder: map.json (scorer, places, recipe), items.npy (where each map item is), drive.npy
 (where each image of the drive was taken), what the scorer has learned (references.npy, or network.onnx and
 weights.safetensors), and SHA256SUMS over all of them, which `sha256sum -c` checks too. A damaged file is
-found on loading, before it answers anything.
+found on loading, before it answers anything. A map of several drives also has belongs.npy, and each of its
+drives is a map of its own in the folder `drives`.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from evplace import places as places_of
 from evplace.core import families
 from evplace.core.errors import EvplaceError, InputError, PlaceMapError
+from evplace.core.folders import instead
 from evplace.core.settings import to_dict
-from evplace.core.storage import new_folder, read_array, write_array, write_json
+from evplace.core.storage import new_folder, read_array, sha256, write_array, write_json
 from evplace.drives.to_traverse import open_traverse
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import MARK as TRAVERSE
@@ -28,20 +30,26 @@ from evplace.imaging.traverse import Traverse
 from evplace.matchers import Learned as LearnedByMatcher
 from evplace.matchers import Matcher, Route
 from evplace.placemap._files import (
+    BELONGS,
+    DRIVES,
     FORMAT,
+    FORMAT_OF_SEVERAL,
+    SUMS,
     TIMES,
     about_of,
     check_sums,
     file_of,
     files_of,
+    linked,
     of_matcher,
     read_content,
     write_content,
     write_sums,
 )
 from evplace.placemap._files import MARK as MARK
+from evplace.placemap._parts import JoinedRows, Part, images_of
 from evplace.places import Places
-from evplace.scorers import REFERENCES, Content, Descriptor, Scorer
+from evplace.scorers import REFERENCES, Content, Descriptor, OpenScorer, Scorer, opened_together, scorer_of
 from evplace.sources.cleaning import MaskSource
 from evplace.sources.tracks import Track
 
@@ -95,12 +103,31 @@ class PlaceMap:
     """What turns its score rows into answers where nothing else is asked for."""
     learned: LearnedByMatcher | None = None
     """What that matcher has learned of the map; None where it learns nothing."""
+    parts: tuple[Part, ...] = ()
+    """The drives of a map of several, in the order in which they came; of a map of one, none."""
+    sums: str | None = field(default=None, repr=False, compare=False)
+    """The checksum of the checksums of the folder that it was read from."""
 
     @property
     def references(self) -> NDArray[np.uint8] | None:
         """(items, h, w) or (items, h, w, C): the reference images, where these are the items."""
         images = self.content.get(REFERENCES)
         return images if isinstance(images, np.ndarray) else None
+
+    def images_of(self, items: ArrayLike) -> NDArray[np.uint8] | None:
+        """(n, h, w) or (n, h, w, C): an image of each of some items (n,); None where the map holds none."""
+        chosen = np.asarray(items, np.int64)
+        if self.parts:
+            return images_of(self.parts, chosen)
+        return None if self.references is None else np.asarray(self.references[chosen])
+
+    def scoring(self) -> OpenScorer:
+        """What compares images with its items; PlaceMapError where its content is not what that needs."""
+        with families.blaming("scorers", self.scorer):
+            if not self.parts:
+                return scorer_of(self.scorer).open(self.content)
+            opened = opened_together(self.scorer, [part.map.content for part in self.parts])
+            return JoinedRows(opened, [part.item for part in self.parts])
 
     def route(self, learned: bool = True) -> Route:
         """What a matcher may know of the items; with what the map's own matcher has learned, or without."""
@@ -181,28 +208,40 @@ class PlaceMap:
             )
 
     def save(self, path: str | Path, overwrite: bool = False) -> None:
-        """Write the folder `path`; OutputError where it exists or cannot be written."""
+        """Write the folder `path`; OutputError where it exists or cannot be written.
+
+        Drives of a map of several that lie there already are not written again.
+        """
         with new_folder(path, overwrite, MARK) as folder:
-            for name, value in self.content.items():
-                write_content(folder, name, value)
-            for name, array in (self.learned or {}).items():
-                write_array(folder / of_matcher(name), array)
-            columns = [self.items.place, *self.items.position.T, self.items.heading_deg]
-            write_array(folder / "items.npy", np.stack(columns, axis=1).astype(np.float64))
-            write_array(folder / "drive.npy", self.drive)
-            if self.items.t_us is not None:
-                write_array(folder / TIMES, self.items.t_us)
-            description = {
-                "format": FORMAT,
-                **self.settings,
-                "places": self.places.to_dict(),
-                "items": "places" if self.items.are_places else "images",
-                "content": [file_of(name, value) for name, value in self.content.items()],
-                "learned": sorted(self.learned or {}),
-                "times": self.items.t_us is not None,
-            }
-            write_json(folder / MARK, description)
+            self._write(folder)
+            for part in self.parts:
+                _write_part(part, folder / DRIVES / part.name, Path(path))
             write_sums(folder)
+
+    def _write(self, folder: Path) -> None:
+        """All but the checksums and the drives of a map of several."""
+        for name, value in self.content.items():
+            write_content(folder, name, value)
+        for name, array in (self.learned or {}).items():
+            write_array(folder / of_matcher(name), array)
+        columns = [self.items.place, *self.items.position.T, self.items.heading_deg]
+        write_array(folder / "items.npy", np.stack(columns, axis=1).astype(np.float64))
+        write_array(folder / "drive.npy", self.drive)
+        if self.items.t_us is not None:
+            write_array(folder / TIMES, self.items.t_us)
+        if self.parts:
+            write_array(folder / BELONGS, np.concatenate([part.item for part in self.parts]))
+        description = {
+            "format": FORMAT_OF_SEVERAL if self.parts else FORMAT,
+            **self.settings,
+            "places": self.places.to_dict(),
+            "items": "places" if self.items.are_places else "images",
+            "content": [file_of(name, value) for name, value in self.content.items()],
+            "learned": sorted(self.learned or {}),
+            "times": self.items.t_us is not None,
+        }
+        several = {"drives": [part.name for part in self.parts]} if self.parts else {}
+        write_json(folder / MARK, description | several)
 
     @classmethod
     def load(
@@ -210,19 +249,24 @@ class PlaceMap:
         path: str | Path,
         scorer: Scorer | Descriptor | None = None,
         matcher: Matcher | None = None,
+        unchecked: bool = False,
     ) -> PlaceMap:
         """The map in the folder `path`; PlaceMapError where it is none, or a byte of it has changed.
 
+        What its scorer has learned is mapped into memory, so that it may be larger than that. Its checksums
+        take reading all of it once: `unchecked` leaves them out, and then a changed byte may not be found.
         `scorer` and `matcher` open a map whose parts no installed package offers: the objects that it was
         trained with.
         """
         folder = Path(path)
         what = f"the map {folder}"
         if not (folder / MARK).is_file():
-            raise PlaceMapError(f"{folder} is no map: a map is a folder that `evplace train` has written")
+            made = f"{folder} is no map: a map is a folder that `evplace train` has written"
+            raise PlaceMapError(instead(folder, MARK) or made)
         try:
             about = about_of(folder, what)
-            check_sums(folder, what, files_of(about))
+            if not unchecked:
+                check_sums(folder, what, files_of(about))
             place_map = cls(
                 scorer=_part_from("scorers", about["scorer"], what) if scorer is None else scorer,
                 places=places_of.from_dict(about["places"]),
@@ -236,6 +280,8 @@ class PlaceMap:
                 matcher=_matcher(about, what) if matcher is None else matcher,
                 learned={name: read_array(folder / of_matcher(name), what) for name in about["learned"]}
                 or None,
+                parts=_parts(folder, about, what, scorer),
+                sums=sha256(folder / SUMS),
             )
             _check_fit(place_map, what)
         except PlaceMapError:
@@ -243,6 +289,33 @@ class PlaceMap:
         except (InputError, EvplaceError) as error:
             raise PlaceMapError(f"{error}" if what in str(error) else f"{what}: {error}") from error
         return place_map
+
+
+def _write_part(part: Part, folder: Path, path: Path) -> None:
+    """Write one drive of a map into `folder`, or take it from the map that lies at `path`."""
+    for old in (path / DRIVES / part.name, path):
+        if part.map.sums is not None and (old / SUMS).is_file() and sha256(old / SUMS) == part.map.sums:
+            return linked(old, folder)
+    folder.mkdir(parents=True)
+    part.map._write(folder)
+    return write_sums(folder)
+
+
+def _parts(
+    folder: Path, about: Mapping[str, Any], what: str, scorer: Scorer | Descriptor | None
+) -> tuple[Part, ...]:
+    """The drives of a map of several."""
+    if not about["drives"]:
+        return ()
+    maps = [PlaceMap.load(folder / DRIVES / name, scorer) for name in about["drives"]]
+    item = read_array(folder / BELONGS, what)
+    ends = np.cumsum([len(one.items) for one in maps])
+    if item.dtype != np.int64 or item.shape != (ends[-1],):
+        raise PlaceMapError(f"{what} is damaged: {item.dtype} {item.shape} for {ends[-1]} references")
+    return tuple(
+        Part(name, one, own)
+        for name, one, own in zip(about["drives"], maps, np.split(item, ends[:-1]), strict=True)
+    )
 
 
 def remembered(folder: Path) -> str:
@@ -318,6 +391,8 @@ def _check_fit(place_map: PlaceMap, what: str) -> None:
         raise PlaceMapError(f"{what} is damaged: its drive is {drive.dtype} {drive.shape}")
     if np.isinf(items.position).any() or np.isinf(items.heading_deg).any():
         raise PlaceMapError(f"{what} is damaged: its items lie at infinity")
+    if place_map.parts:
+        _check_parts(place_map, what)
     images = place_map.references
     if images is not None and (
         images.dtype != np.uint8 or images.shape != (len(items), *place_map.image_shape)
@@ -328,15 +403,45 @@ def _check_fit(place_map: PlaceMap, what: str) -> None:
         )
 
 
-from evplace.placemap._training import calibrate, default_matcher, default_scorer, train  # noqa: E402 - they make a PlaceMap
+def _check_parts(place_map: PlaceMap, what: str) -> None:
+    """PlaceMapError where the drives of a map are not such as belong together."""
+    items = len(place_map.items)
+    belong = np.concatenate([part.item for part in place_map.parts])
+    if len(np.unique(belong)) != items or belong.min() != 0 or belong.max() != items - 1:
+        raise PlaceMapError(f"{what} is damaged: its references do not belong to its {items} items")
+    for part in place_map.parts:
+        if part.map.parts or part.map.scorer != place_map.scorer:
+            raise PlaceMapError(f"{what} is damaged: its drive '{part.name}' is no map of one drive like it")
+        if part.map.image_shape != place_map.image_shape or part.map.items.are_places:
+            raise PlaceMapError(f"{what} is damaged: its drive '{part.name}' has images of another shape")
+
+
+from evplace.placemap._changing import (  # noqa: E402 - they make a PlaceMap
+    add,
+    merge,
+    named,
+    names_of,
+    parts_of,
+    split,
+    versions_of,
+)
+from evplace.placemap._training import calibrate, default_matcher, default_scorer, train  # noqa: E402
 
 __all__ = [
     "MARK",
     "Items",
+    "Part",
     "PlaceMap",
+    "add",
     "calibrate",
     "default_matcher",
     "default_scorer",
+    "merge",
+    "named",
+    "names_of",
+    "parts_of",
     "remembered",
+    "split",
     "train",
+    "versions_of",
 ]

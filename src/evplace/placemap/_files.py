@@ -2,31 +2,41 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
+from evplace.core import folders
 from evplace.core.errors import InputError, PlaceMapError
 from evplace.core.storage import read_array, read_bytes, read_json, sha256, write_array
 
 FORMAT = "evplace-map-2"
+FORMAT_OF_SEVERAL = "evplace-map-3"
+"""Of a map of several drives: each is a map of its own in the folder `drives`."""
 OLD_FORMAT = "evplace-map-1"
 """Its recipe and scorer lie in pieces in `settings`."""
 SUMS = "SHA256SUMS"
-MARK = "map.json"
+MARK = folders.MAP
 """What tells a folder that was written here from any other: only such a one is replaced."""
 TIMES = "times.npy"
-RESERVED = (MARK, "items.npy", "drive.npy", TIMES)
+DRIVES = "drives"
+BELONGS = "belongs.npy"
+"""The item that each reference belongs to, of all drives one behind the other."""
+RESERVED = (MARK, "items.npy", "drive.npy", TIMES, BELONGS)
 """Files that hold no scorer's content."""
 _NAME = re.compile(r"[a-z][a-z0-9_-]*(\.[a-z0-9]+)?")
 """What scorers may call their content."""
+_DRIVE = re.compile(r"[a-z0-9_][a-z0-9_-]{0,99}")
+"""What drives of a map may be called."""
 _SHAPE: dict[str, tuple[type, ...]] = {
     "scorer": (dict,), "places": (dict,), "recipe": (dict, type(None)), "image_shape": (list,),
     "zone": (list, type(None)), "info": (dict,), "items": (str,), "content": (list,),
-    "matcher": (dict, type(None)), "learned": (list,), "times": (bool,),
+    "matcher": (dict, type(None)), "learned": (list,), "times": (bool,), "drives": (list,),
 }  # fmt: skip
 """What map.json holds: a name and the kinds of JSON that it may be."""
 
@@ -36,8 +46,13 @@ def about_of(folder: Path, what: str) -> dict[str, Any]:
     about = read_json(folder / MARK, what)
     if about.get("format") == OLD_FORMAT:
         about = {"format": FORMAT} | _of_old_format(about, (folder / "references.npy").exists(), what)
-    about = {"matcher": None, "learned": [], "times": False} | about  # maps of before know none of these
-    if about.get("format") != FORMAT:
+    about = {
+        "matcher": None,
+        "learned": [],
+        "times": False,
+        "drives": [],
+    } | about  # maps of before lack these
+    if about.get("format") != (FORMAT_OF_SEVERAL if about["drives"] else FORMAT):
         raise PlaceMapError(f"{what} has the format {about.get('format')!r}, this version reads {FORMAT}")
     for name, kinds in _SHAPE.items():
         if name not in about or not isinstance(about[name], kinds):
@@ -52,6 +67,11 @@ def about_of(folder: Path, what: str) -> dict[str, Any]:
     if not isinstance(scorer.get("name"), str) or not isinstance(scorer.get("settings"), dict):
         raise PlaceMapError(f"{what} is damaged: its scorer is {scorer!r}")
     _check_matcher(about, what)
+    drives = about["drives"]
+    if not all(isinstance(name, str) and _DRIVE.fullmatch(name) for name in drives) or len(set(drives)) < len(
+        drives
+    ):
+        raise PlaceMapError(f"{what} is damaged: its drives are {drives!r}")
     names = about["content"]
     if not all(isinstance(name, str) and _may_be_called(name) for name in names) or len(set(names)) < len(
         names
@@ -95,9 +115,9 @@ def _check_matcher(about: dict[str, Any], what: str) -> None:
 def files_of(about: dict[str, Any]) -> set[str]:
     """All files of a map but its checksums."""
     learned = {of_matcher(name) for name in about["learned"]}
-    return {MARK, "items.npy", "drive.npy", *about["content"], *learned} | (
-        {TIMES} if about["times"] else set()
-    )
+    parts = {f"{DRIVES}/{name}/{SUMS}" for name in about["drives"]}
+    more = ({TIMES} if about["times"] else set()) | ({BELONGS, *parts} if parts else set())
+    return {MARK, "items.npy", "drive.npy", *about["content"], *learned, *more}
 
 
 def of_matcher(name: str) -> str:
@@ -138,9 +158,26 @@ def _read(file: Path, what: str) -> NDArray[Any] | bytes:
 
 
 def write_sums(folder: Path) -> None:
-    """SHA256SUMS over all that lies in the folder."""
-    sums = [f"{sha256(file)}  {file.name}\n" for file in sorted(folder.iterdir())]
+    """SHA256SUMS over all that lies in the folder; of drives of its own, over their SHA256SUMS."""
+    files = [file for file in sorted(folder.iterdir()) if file.is_file()]
+    files += sorted(folder.glob(f"{DRIVES}/*/{SUMS}"))
+    sums = [f"{sha256(file)}  {file.relative_to(folder).as_posix()}\n" for file in files]
     (folder / SUMS).write_text("".join(sums), "ascii")
+
+
+def linked(old: Path, new: Path) -> None:
+    """The files of a map of one drive also under another name: as links, where the disk has any."""
+    new.mkdir(parents=True)
+    for line in (old / SUMS).read_text("ascii").splitlines():
+        _link(old / line.split("  ", 1)[1], new)
+    _link(old / SUMS, new)
+
+
+def _link(file: Path, folder: Path) -> None:
+    try:
+        os.link(file, folder / file.name)
+    except OSError:
+        shutil.copyfile(file, folder / file.name)
 
 
 def check_sums(folder: Path, what: str, needed: set[str]) -> None:

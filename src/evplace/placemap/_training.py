@@ -13,14 +13,21 @@ from evplace.core import families
 from evplace.core.errors import PartError, SettingsError
 from evplace.imaging.activity import activity
 from evplace.imaging.traverse import Traverse
-from evplace.matchers import Matcher, RouteMatcher, Rows
+from evplace.matchers import Learned as LearnedByMatcher
+from evplace.matchers import LearnsMore, Matcher, Route, RouteMatcher, Rows
 from evplace.matchers.bayes import Bayes
 from evplace.matchers.local import Local
 from evplace.placemap import Items, PlaceMap
+from evplace.placemap._parts import JoinedRows
 from evplace.places import Places
-from evplace.scorers import Descriptor, Learned, Learning, Scorer, scorer_of, usable
+from evplace.scorers import Descriptor, Learned, Learning, Scorer, require, scorer_of, usable
 from evplace.scorers.fused import Fused
 from evplace.scorers.network import Network
+
+MOST_OWN = 3000
+"""Own images of a map of several drives on which it is measured."""
+MOST_CELLS, LEAST_OWN = 12_000_000, 200
+"""Own images times items, for a drive that comes to a large map: seconds; but no fewer images than this."""
 
 
 def train(
@@ -43,11 +50,13 @@ def train(
     """
     named = default_scorer(preset) if scorer is None else scorer
     part: Scorer | Descriptor = families.make("scorers", named, preset, settings)
-    made = _learned(reference, places, part, learning or Learning())
-    if matcher is None:
+    chosen = None if matcher is None else families.make("matchers", matcher, None, {})
+    require(part)  # what is wrong with the parts is said before the work
+    made = learned_map(reference, places, part, learning or Learning())
+    if chosen is None:
         by = preset if preset in Local.presets and made.items.are_places else None
         return calibrate(made, Local.presets[by] if by else None)
-    return calibrate(made, families.make("matchers", matcher, None, {}))
+    return calibrate(made, chosen)
 
 
 def default_scorer(preset: str | None) -> str:
@@ -74,28 +83,89 @@ def calibrate(place_map: PlaceMap, matcher: Matcher | None = None) -> PlaceMap:
     """
     chosen = matcher or place_map.matcher or default_matcher(place_map)
     place_map = dataclasses.replace(place_map, matcher=chosen, learned=None)
-    images = place_map.references
-    if images is None or not isinstance(chosen, RouteMatcher):
+    if not _has_images(place_map) or not isinstance(chosen, RouteMatcher):
         return place_map
-    with families.blaming("scorers", place_map.scorer):
-        opened = scorer_of(place_map.scorer).open(place_map.content)
-
-    def rows(items: slice) -> Rows:
-        with families.blaming("scorers", place_map.scorer):
-            return opened.rows(np.asarray(images[items]))
-
+    own = OwnRows(place_map)
     with families.blaming("matchers", chosen):
-        learned = chosen.learn(place_map.route()._replace(content=_content(place_map, images)), rows)
+        learned = chosen.learn(own.route(_content(place_map)), own.rows)
     return dataclasses.replace(place_map, learned=learned or None)
 
 
-def _content(place_map: PlaceMap, images: NDArray[np.uint8]) -> float:
+def calibrate_more(place_map: PlaceMap, before: LearnedByMatcher | None, new: int) -> PlaceMap:
+    """The same for a map to which the drives from number `new` on have just come.
+
+    Of a large map, only these are measured, so that it costs no more than a drive does; what was known of the
+    others, `before`, is kept.
+    """
+    matcher: object = place_map.matcher
+    most = max(MOST_CELLS // len(place_map.items), LEAST_OWN)
+    if before is None or not isinstance(matcher, LearnsMore) or most >= _images(place_map):
+        return calibrate(place_map)
+    own = OwnRows(place_map, range(new, len(place_map.parts)), most)
+    content = _content(dataclasses.replace(place_map, parts=place_map.parts[new:]))
+    with families.blaming("matchers", matcher):
+        learned = matcher.learn_more(before, own.route(content), own.rows)
+    return dataclasses.replace(place_map, learned=learned or None)
+
+
+def _images(place_map: PlaceMap) -> int:
+    """How many own images a map is measured on."""
+    return min(sum(len(part.item) for part in place_map.parts), MOST_OWN)
+
+
+def _has_images(place_map: PlaceMap) -> bool:
+    return not place_map.items.are_places and place_map.images_of([0]) is not None
+
+
+class OwnRows:
+    """The score rows of a map's own images: of several drives, as many of each, one behind the other."""
+
+    def __init__(self, place_map: PlaceMap, drives: range | None = None, most: int = MOST_OWN) -> None:
+        """Of some of its drives, by their numbers; None for all. `most` is how many images in all."""
+        self._map, self._scoring = place_map, place_map.scoring()
+        parts = place_map.parts
+        self._first = np.cumsum([0, *(len(part.item) for part in parts)])
+        chosen = drives or range(len(parts))
+        self._many = {drive: min(len(parts[drive].item), most // len(chosen)) for drive in chosen}
+        self._images = [(drive, at) for drive, many in self._many.items() for at in range(many)]
+
+    def route(self, content: float) -> Route:
+        """What a matcher learns from, besides the rows; `content` is what the images usually show."""
+        parts = self._map.parts
+        own = [parts[drive].item[:many] for drive, many in self._many.items()] if parts else None
+        return self._map.route()._replace(content=content, own=own)
+
+    def rows(self, images: slice) -> Rows:
+        """(n, items) of some of them. Of several drives, none counts that an image has with itself."""
+        with families.blaming("scorers", self._map.scorer):
+            if self._map.parts:
+                return np.concatenate([self._others(*image) for image in self._images[images]])
+            references = self._map.references
+            assert references is not None
+            return self._scoring.rows(np.asarray(references[images]))
+
+    def _others(self, drive: int, at: int) -> Rows:
+        """(1, items) of one image of a map of several drives."""
+        image = self._map.parts[drive].map.images_of([at])
+        assert isinstance(self._scoring, JoinedRows)
+        assert image is not None
+        rows = self._scoring.of_references(image)
+        rows[0, self._first[drive] + at] = rows[0].min()
+        return self._scoring.best(rows)
+
+
+def _content(place_map: PlaceMap) -> float:
     """What the map's references usually show; NaN of camera images, which no longer follow one another."""
-    of_events = place_map.recipe is not None and place_map.recipe.kind == "events"
-    return float(np.median(activity(images, of_events=True))) if of_events else math.nan
+    if place_map.recipe is None or place_map.recipe.kind != "events":
+        return math.nan
+    maps = [part.map for part in place_map.parts] or [place_map]
+    shown = [activity(one.references, of_events=True) for one in maps if one.references is not None]
+    return float(np.median(np.concatenate(shown)))
 
 
-def _learned(reference: Traverse, places: Places, part: Scorer | Descriptor, learning: Learning) -> PlaceMap:
+def learned_map(
+    reference: Traverse, places: Places, part: Scorer | Descriptor, learning: Learning
+) -> PlaceMap:
     """The map as its scorer learns it."""
     _, used = usable(reference, places)
     track = reference.track

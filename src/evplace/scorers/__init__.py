@@ -7,7 +7,7 @@ the images themselves are the map, and an image scores by the product of its vec
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -19,7 +19,7 @@ from evplace.core import families
 from evplace.core.errors import PartError, PlaceMapError, TraverseError
 from evplace.imaging.traverse import Traverse
 from evplace.places import Places
-from evplace.scorers._search import Exact
+from evplace.searchers.exact import ExactSearch
 
 Rows = NDArray[np.float32]
 """(queries, items) scores."""
@@ -61,8 +61,20 @@ class OpenScorer(Protocol):
         """(n, h, w) or (n, h, w, C) uint8 -> (n, items)."""
 
 
+@runtime_checkable
+class ComparesSome(Protocol):
+    """An OpenScorer that can also compare with some items alone, which is faster."""
+
+    def some(self, images: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        """(n, len(items)) what `rows` would give for these items."""
+
+
 class Scorer(Protocol):
-    """A way to compare, with its settings. A class may have `presets`: names and objects of it."""
+    """A way to compare, with its settings. A class may have `presets`: names and objects of it.
+
+    One that learns by a package that may be missing has `require()`, which raises MissingExtraError then: it
+    is asked before the work.
+    """
 
     def learn(self, reference: Traverse, places: Places, learning: Learning) -> Learned:
         """Learn the drive; `usable` says which of its images have a place."""
@@ -77,6 +89,40 @@ class Descriptor(Protocol):
 
     def describe(self, images: NDArray[np.uint8]) -> Vectors:
         """(n, h, w) or (n, h, w, C) uint8 -> (n, dimensions); the product of two vectors is a score."""
+
+
+@runtime_checkable
+class OfParts(Protocol):
+    """A Scorer that describes images by descriptors, which contents that are opened together can share."""
+
+    @property
+    def parts(self) -> Mapping[str, Descriptor]:
+        """The descriptors by their names."""
+
+    def open(self, content: Content, parts: Mapping[str, Descriptor] | None = None) -> OpenScorer:
+        """See Scorer; with other objects for `parts`."""
+
+
+@runtime_checkable
+class Thins(Protocol):
+    """A Scorer that can do without some references."""
+
+    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content | None:
+        """What is left of a content that was learned, with these of its items; None where it stays whole."""
+
+
+class Remembering:
+    """A descriptor that does not describe the last images anew."""
+
+    def __init__(self, descriptor: Descriptor) -> None:
+        self._descriptor = descriptor
+        self._last: tuple[NDArray[np.uint8], Vectors] | None = None
+
+    def describe(self, images: NDArray[np.uint8]) -> Vectors:
+        """See Descriptor."""
+        if self._last is None or not np.array_equal(self._last[0], images):
+            self._last = images.copy(), self._descriptor.describe(images)
+        return self._last[1]
 
 
 @dataclass(frozen=True)
@@ -99,10 +145,13 @@ class _DescribedRows:
 
     def __init__(self, descriptor: Descriptor, references: NDArray[np.uint8]) -> None:
         self._descriptor = descriptor
-        self._search = Exact(in_blocks(self._vectors, references))
+        self._search = ExactSearch(in_blocks(self._vectors, references))
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         return self._search.rows(self._vectors(images))
+
+    def some(self, images: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        return self._search.scores(self._vectors(images), items)
 
     def _vectors(self, images: NDArray[np.uint8]) -> Vectors:
         vectors = self._descriptor.describe(images)
@@ -127,6 +176,26 @@ def in_blocks(vectors_of: Callable[[NDArray[np.uint8]], Vectors], images: NDArra
 def scorer_of(part: Scorer | Descriptor) -> Scorer:
     """The part itself, or the scorer that a descriptor makes."""
     return Described(part) if isinstance(part, Descriptor) else part
+
+
+def opened_together(part: Scorer | Descriptor, contents: Sequence[Content]) -> list[OpenScorer]:
+    """The part over each of some contents; an image that all are asked about is described once, if can be."""
+    if isinstance(part, OfParts):
+        shared = {name: Remembering(one) for name, one in part.parts.items()}
+        return [part.open(content, shared) for content in contents]
+    return [scorer_of(part).open(content) for content in contents]
+
+
+def require(part: Scorer | Descriptor) -> None:
+    """MissingExtraError where what a scorer learns with is not installed."""
+    getattr(part, "require", lambda: None)()
+
+
+def thinned(part: Scorer | Descriptor, content: Content, items: NDArray[np.int64]) -> Content | None:
+    """What is left of a content with these of its items; None where the part cannot do without the others."""
+    if isinstance(part, Thins):
+        return part.thinned(content, items)
+    return {REFERENCES: references_of(content)[items]} if set(content) == {REFERENCES} else None
 
 
 def usable(reference: Traverse, places: Places) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:

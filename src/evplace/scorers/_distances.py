@@ -32,7 +32,8 @@ def sad(queries: Images, references: Images) -> Table:
     q, r = _as_pixels(queries, references)
     if q.dtype != np.uint8 or r.dtype != np.uint8:
         raise InputError(f"sad takes uint8 images, these are {q.dtype} and {r.dtype}: use ssd or ncc")
-    table: Table = _sad(np.ascontiguousarray(q), np.ascontiguousarray(r))
+    table = np.empty((len(q), len(r)), np.float32)
+    _sad(np.ascontiguousarray(q), np.ascontiguousarray(r), table)
     return table
 
 
@@ -72,10 +73,9 @@ def blocks(
 
 
 @njit(cache=True, nogil=True)
-def _sad(queries: NDArray[np.uint8], references: NDArray[np.uint8]) -> Table:
+def _sad(queries: NDArray[np.uint8], references: NDArray[np.uint8], table: Table) -> None:
     """A query stays in the first cache while eight references pass."""
     pixels = queries.shape[1]
-    table = np.empty((queries.shape[0], references.shape[0]), np.float32)
     for first in range(0, references.shape[0], 8):
         for q in range(queries.shape[0]):
             for r in range(first, min(first + 8, references.shape[0])):
@@ -84,7 +84,6 @@ def _sad(queries: NDArray[np.uint8], references: NDArray[np.uint8]) -> Table:
                     end = start + PIECE
                     total += _difference(queries[q][start:end], references[r][start:end])
                 table[q, r] = total / pixels
-    return table
 
 
 @njit(cache=True, nogil=True)

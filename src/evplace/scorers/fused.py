@@ -10,13 +10,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core import families
 from evplace.core.errors import PlaceMapError, SettingsError
-from evplace.core.zscores import robust_z
+from evplace.core.zscores import ordered, robust_z
 from evplace.imaging.activity import activity
 from evplace.imaging.averaging import Averaging, averaged
 from evplace.imaging.spacing import Spacer, SpacingSettings
@@ -35,8 +36,10 @@ from evplace.scorers import (
     usable,
 )
 from evplace.scorers._compressed import Compressed, compress
+from evplace.scorers._indexed import IndexedRows, indexed, scale
 from evplace.scorers.edges import Edges
 from evplace.scorers.trained import Trained
+from evplace.searchers import ABOUT, usual
 
 VERSIONS = "descriptors.json"
 """Content of a map: which descriptors made its vectors."""
@@ -63,12 +66,17 @@ class Fused:
     """Whether the trained descriptor takes part; False leaves the edges alone."""
     components: int = 256
     """Numbers that are kept of a vector of the edges; half as many of one of the trained descriptor."""
+    index: str | None = None
+    """How references are searched: a part of `evplace.searchers`, of which exact compares with all of them.
+    Default: exact up to 300,000 references, beyond that faiss."""
 
     presets: ClassVar[Mapping[str, Fused]]
 
     def __post_init__(self) -> None:
         if not 0 <= self.every_m < 1e6 or self.components < 2:
             raise SettingsError("the settings of fused need every_m of 0 or more, components of 2 or more")
+        if self.index is not None:
+            families.load("searchers", self.index)
 
     @property
     def parts(self) -> dict[str, Descriptor]:
@@ -81,19 +89,42 @@ class Fused:
         filled = np.flatnonzero(reference.counts != 0)
         means = averaged(reference.images[filled], reference.t_us[filled], self.averaging)
         references = means[np.searchsorted(filled, kept)]
-        content: dict[str, NDArray[np.float32] | NDArray[np.uint8] | bytes] = {REFERENCES: references}
+        content: dict[str, NDArray[Any] | bytes] = {REFERENCES: references}
+        found = {}
         for name, part in self.parts.items():
             many = self.components if name == "edges" else self.components // 2
-            found = compress(in_blocks(part.describe, references), many)
-            content |= {f"{name}_basis": found.basis, f"{name}_vectors": found.vectors}
+            found[name] = compress(in_blocks(part.describe, references), many)
+        index = self.index or usual(len(kept))
+        content |= _side_by_side(found) if index == "exact" else indexed(found, WEIGHTS, index)
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
 
-    def open(self, content: Content) -> OpenScorer:
-        """See Scorer."""
-        items = len(references_of(content))
+    def thinned(self, content: Content, items: NDArray[np.int64]) -> Content | None:
+        """See Thins: an index stays whole."""
+        if ABOUT in content:
+            return None
+        of_items = {REFERENCES, *(f"{name}_vectors" for name in self.parts)}
+        return {
+            name: value[items] if name in of_items and isinstance(value, np.ndarray) else value
+            for name, value in content.items()
+        }
+
+    def open(self, content: Content, parts: Mapping[str, Descriptor] | None = None) -> OpenScorer:
+        """See OfParts."""
+        references = references_of(content)
+        items = len(references)
         _check_versions(content, _versions(self))
-        return _FusedRows([(name, part, _read(content, name, items)) for name, part in self.parts.items()])
+        used = parts or self.parts
+        opened: IndexedRows | _FusedRows = (
+            IndexedRows(used, WEIGHTS, content, items)
+            if ABOUT in content
+            else _FusedRows([(name, part, _read(content, name, items)) for name, part in used.items()])
+        )
+        try:
+            opened.some(np.asarray(references[:1]), np.zeros(1, np.int64))
+        except ValueError as error:  # of numpy, whose products fit no other numbers
+            raise PlaceMapError("the map's vectors do not fit its images: train it again") from error
+        return opened
 
 
 Fused.presets = {"best": Fused()}
@@ -108,6 +139,10 @@ class _FusedRows:
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         return np.concatenate([self._row(images[at : at + 1]) for at in range(len(images))])
 
+    def some(self, images: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        """See ComparesSome."""
+        return np.concatenate([self._some(images[at : at + 1], items) for at in range(len(images))])
+
     def _row(self, image: NDArray[np.uint8]) -> Rows:
         """(1, items): image by image, so that a row does not depend on what else is asked."""
         scores = [
@@ -115,6 +150,25 @@ class _FusedRows:
             for name, part, searched in self._parts
         ]
         return robust_z(np.sum(scores, axis=0))[None]
+
+    def _some(self, image: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
+        """(1, len(items)): what is usual is told by those that tell it of a whole row."""
+        weights = [WEIGHTS[name] for name, _, _ in self._parts]
+        described = [part.describe(image) @ searched.basis for _, part, searched in self._parts]
+        held = [searched.vectors for _, _, searched in self._parts]
+        usual = [one.dot(all_.T[:, ordered(len(all_))])[0] for one, all_ in zip(described, held, strict=True)]
+        by = scale(usual, weights)
+        scores = [
+            np.float32(factor) * (one @ all_[items].T)
+            for factor, one, all_ in zip(by.factors, described, held, strict=True)
+        ]
+        return np.asarray(np.sum(scores, axis=0) - np.float32(by.shift), np.float32)
+
+
+def _side_by_side(found: Mapping[str, Compressed]) -> dict[str, NDArray[np.float32]]:
+    """The content of a map whose references are all compared."""
+    bases = {f"{name}_basis": one.basis for name, one in found.items()}
+    return bases | {f"{name}_vectors": one.vectors for name, one in found.items()}
 
 
 def _kept(reference: Traverse, places: Places, every_m: float) -> NDArray[np.int64]:

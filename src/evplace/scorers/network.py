@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.core.errors import PlaceMapError, SettingsError
+from evplace.core.errors import MissingExtraError, PlaceMapError, SettingsError
 from evplace.imaging.traverse import Traverse
 from evplace.places import Places
 from evplace.scorers import Content, Learned, Learning, usable
@@ -77,6 +77,14 @@ class Network:
             )
 
     presets: ClassVar[Mapping[str, Network]]
+
+    def require(self) -> None:
+        """MissingExtraError where what trains it is not installed."""
+        for package in ("torch", "onnx"):
+            try:
+                __import__(package)
+            except ImportError as error:
+                raise MissingExtraError(package, "train", "training the network") from error
 
     def learn(self, reference: Traverse, places: Places, learning: Learning) -> Learned:
         """See Scorer; a run that was killed goes on from its checkpoint and ends in the same weights."""

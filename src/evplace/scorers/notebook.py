@@ -36,8 +36,13 @@ class Notebook:
         """See Scorer."""
         return self.network.learn(reference, places, learning)
 
+    def require(self) -> None:
+        """MissingExtraError where what trains the network is not installed."""
+        self.network.require()
+
     def open(self, content: Content) -> NotebookRows:
-        """See Scorer."""
+        """See Scorer; MissingExtraError without torch."""
+        self.require()
         return NotebookRows(file_of(content, WEIGHTS), self)
 
 

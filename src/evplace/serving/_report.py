@@ -7,13 +7,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from evplace.localizer import Match
+from evplace.localizer import SURE, Match
 from evplace.placemap import PlaceMap
 from evplace.serving._feed import Counters
 
 RUNNERS_UP = 5
-SURE = ("localised", "standing")
-"""States in which the position is the camera's."""
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ import struct
 import time
 from typing import Any, NamedTuple
 
-from evplace.localizer import Match
+from evplace.localizer import SURE, Match
 from evplace.placemap import PlaceMap
-from evplace.serving._report import SURE, Report, epsg
+from evplace.serving._report import Report, epsg
 from evplace.sources.live.zenoh import GID, attachment, leave, session
 
 UNKNOWN_M = 1000.0

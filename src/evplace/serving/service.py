@@ -135,13 +135,14 @@ class Service:
 
     def reference(self, item: int) -> bytes | None:
         """A reference image as PNG; None where the map has none for that item."""
-        images = self.map.references
-        if not _has_images(self.map) or images is None or not 0 <= item < len(images):
+        if not _has_images(self.map) or not 0 <= item < len(self.map.items):
             return None
+        image = self.map.images_of([item])
+        assert image is not None
         from PIL import Image
 
         file = io.BytesIO()
-        Image.fromarray(grey(np.asarray(images[item]))).save(file, "PNG")
+        Image.fromarray(grey(image[0])).save(file, "PNG")
         return file.getvalue()
 
     def _counters(self) -> dict[str, Any]:
@@ -199,7 +200,7 @@ def _played(replay: Replaying) -> dict[str, Any]:
 
 
 def _has_images(place_map: PlaceMap) -> bool:
-    images = place_map.references
+    images = place_map.images_of([0])
     return images is not None and images.dtype == np.uint8 and images.ndim in (3, 4)
 
 

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from threading import Lock
 from typing import NamedTuple
 
+from evplace.core import folders
 from evplace.core.errors import OutputError
 from evplace.core.settings import to_dict
 from evplace.core.storage import new_file, read_json, write_json
-from evplace.core.workers import run_all
+from evplace.core.workers import Here, Workers, run_all, workers_of
 from evplace_lab.city.plan import VERSION, CitySettings, drive_name
 from evplace_lab.city.recording import record_drive
 from evplace_lab.city.town import build_town
 from evplace_lab.city.warming import warm
 
-SETTINGS_FILE = "city.json"
+SETTINGS_FILE = folders.CITY
 
 
 class Progress(NamedTuple):
@@ -38,7 +38,7 @@ Report = Callable[[Progress], None]
 def generate(
     out: str | Path,
     settings: CitySettings | None = None,
-    workers: int | None = None,
+    workers: int | Workers | None = None,
     progress: Report | None = None,
     drives: Sequence[tuple[str, int]] | None = None,
 ) -> list[Path]:
@@ -47,9 +47,9 @@ def generate(
     `drives` names (condition, path) pairs of their own, instead of every condition on every path.
 
     Each holds a traverse for each sensor, the traverse `colour` (same times, same truth), and poses.npy
-    (n, 6): easting, northing, height in metres, yaw, pitch, roll in radians. `workers` processes are used
-    (None: one a core); the result does not depend on them. A drive that is there already is kept, so that a
-    killed call goes on where it was.
+    (n, 6): easting, northing, height in metres, yaw, pitch, roll in radians. `workers` is how many processes
+    are used (None: one a core), or where; the result does not depend on them. A drive that is there already
+    is kept, so that a killed call goes on where it was.
 
     Raises OutputError where `out` was made with other settings, is being written, or the disk is full.
     """
@@ -59,9 +59,9 @@ def generate(
     names = [drive_name(name, path) for name, path in pairs]
     todo = [pair for pair, name in zip(pairs, names, strict=True) if not (folder / name).is_dir()]
     meter = _Meter([drive_name(*pair) for pair in todo], progress)
-    count = min(workers or os.cpu_count() or 1, len(todo))
-    if count > 1:
-        _in_processes(folder, chosen, todo, count, meter)
+    used = workers_of(workers)
+    if len(todo) > 1 and used != Here(1):
+        _in_processes(folder, chosen, todo, used, meter)
     elif todo:
         town = build_town(chosen.seed)
         for name, path in todo:
@@ -117,11 +117,11 @@ class _Meter:
 
 
 def _in_processes(
-    folder: Path, settings: CitySettings, todo: list[tuple[str, int]], count: int, meter: _Meter
+    folder: Path, settings: CitySettings, todo: list[tuple[str, int]], workers: Workers, meter: _Meter
 ) -> None:
-    """Each drive in a process of its own; the loops are compiled here first, once and not `count` times."""
+    """Each drive in a process of its own; the loops are compiled here first, once and not by each."""
     warm(settings)
     plain = to_dict(settings)
     jobs = [{"out": str(folder), "settings": plain, "condition": name, "path": path} for name, path in todo]
     updates = [meter.of(drive_name(*pair)) for pair in todo]
-    run_all("evplace_lab.city.worker", jobs, count, lambda index, line: updates[index](float(line)))
+    run_all("evplace_lab.city.worker", jobs, workers, folder, lambda index, line: updates[index](float(line)))

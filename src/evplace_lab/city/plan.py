@@ -44,7 +44,7 @@ class CitySettings:
     seed: int = 0
     """Draws the town, and everything in it."""
     keep_events: bool = False
-    """Keep the events too: about 150 MB for each minute and sensor."""
+    """Keep the events too, with logs of the positions: about 150 MB for each minute and sensor."""
 
     def __post_init__(self) -> None:
         for name in self.conditions:

@@ -13,7 +13,9 @@ import utm
 from numpy.typing import NDArray
 
 from evplace.core.events import Events, Size
+from evplace.core.folders import DRIVE
 from evplace.core.storage import GrowingArray, new_folder, write_array
+from evplace.exports import nmea, of_track
 from evplace.imaging.images import Imager, frame_image
 from evplace.imaging.recipe import Recipe
 from evplace.imaging.traverse import TraverseWriter, new_traverse
@@ -29,7 +31,7 @@ from evplace_lab.city.town import Town
 COLOUR = "colour"
 """Folder of the colour traverse, beside one for each sensor."""
 
-MARK = "poses.npy"
+MARK = DRIVE
 """What marks a folder that was written here: only such a one is replaced."""
 PACKET = 1 << 17
 """Events that are written at a time."""
@@ -56,7 +58,22 @@ def record_drive(out: Path, town: Town, settings: CitySettings, name: str, path:
         poses = np.array(_drive(film, settings, sensors, colour, drive_number(name, path), tick))
         for writer in (colour, *(sensor.writer for sensor in sensors)):
             writer.track = _track(np.array(colour.t_us), poses)
+        if settings.keep_events:
+            for preset in settings.sensors:
+                write_logs(folder / preset, _track(np.array(colour.t_us), poses))
         write_array(folder / MARK, poses)
+
+
+def write_logs(recording: Path, track: Track) -> None:
+    """Where the camera was, as logs beside a recording: its name with .nmea and .csv."""
+    with recording.with_suffix(".nmea").open("w", encoding="utf-8") as file:
+        file.writelines(f"{line}\n" for line in nmea.lines(of_track(track)))
+    columns = (track.t_us, track.latitude, track.longitude, track.xy[:, 0], track.xy[:, 1], track.heading_deg)
+    with recording.with_suffix(".csv").open("w", encoding="utf-8") as file:
+        file.write("t_us,latitude,longitude,easting,northing,heading_deg\n")
+        for t_us, latitude, longitude, *metres, heading in zip(*columns, strict=True):
+            east, north = (f"{value:.2f}" for value in metres)
+            file.write(f"{t_us},{latitude:.7f},{longitude:.7f},{east},{north},{heading:.1f}\n")
 
 
 def _drive(

@@ -4,6 +4,7 @@ Examples:
   evplace city -o city                                     the benchmark: two paths by day, night and rain
   evplace city -o small --route-length-m 300 --fps 60      minutes, not a quarter of an hour
   evplace city -o winter --conditions day snow --paths 1 --keep-events
+  evplace city -o city --on ray                            on a cluster whose nodes share the folder
   evplace city --preview sheet.png                         what it looks like; .webp or .gif moves
 
 Each drive is a folder: a traverse for each sensor (ideal, weak, from-8bit) and for the colour camera, with
@@ -20,12 +21,13 @@ import tyro
 
 from evplace.cli._output import print_json, progress, say
 from evplace.cli._settings import SettingsFlags
+from evplace.cli._workers import WorkerFlags
 from evplace.core.errors import SettingsError
 from evplace_lab.city import CitySettings, generate, moving_preview, preview
 
 
 @dataclass(frozen=True)
-class Args(SettingsFlags):
+class Args(WorkerFlags, SettingsFlags):
     """Flags of `evplace city`."""
 
     out: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
@@ -33,8 +35,6 @@ class Args(SettingsFlags):
     preview: Path | None = None
     """Only write a picture: a contact sheet (.png), or a short drive (.webp, .gif)."""
     city: Annotated[CitySettings, tyro.conf.arg(name="")] = field(default_factory=CitySettings)
-    workers: int | None = None
-    """Processes; one a core if not given. They do not change the result."""
     json: bool = False
     """Print one JSON object."""
 
@@ -47,11 +47,11 @@ def run(args: Args) -> int:
         return 0
     if args.out is None:
         raise SettingsError("say where the drives go: evplace city -o FOLDER")
-    with progress("driving") as show:
+    with args.opened_workers() as workers, progress("driving") as show:
         drives = generate(
             args.out,
             args.city,
-            args.workers,
+            workers,
             lambda at: show(round(at.share * 1000), 1000, f"{at.drive}, {at.left_s:.0f} s left"),
         )
     if args.json:

@@ -2,50 +2,46 @@
 
 Examples:
   evplace demo
+  evplace demo --quick                  a day and a night: a minute or two
   evplace demo --out demo
   evplace demo --drive-m 600 --train    a longer street; trains the paper's networks on it, with torch
   evplace demo --live                   the drive at night on a page, as it goes (the extra 'web')
 
 Nothing is downloaded and no torch is needed: the virtual city makes the drives, and the paper's networks for
-its usual street come with evplace (`--train` makes them anew). The folder keeps report.html, report.png,
-result.json, the maps, and the result of each row.
+its usual street come with evplace (`--train` makes them anew). The folder keeps street.png, report.html,
+report.png, result.json, the maps, and the result of each row.
 """
 
 from __future__ import annotations
 
 import contextlib
-import functools
+import dataclasses
 import itertools
-from collections.abc import Iterator
+import os
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
-import numpy as np
-
-from evplace.cli._output import Show, print_json, print_table, progress, say
+from evplace.cli._output import Show, print_json, print_table, progress, say, show_page
 from evplace.core.errors import MissingExtraError, SettingsError
 from evplace.core.storage import new_file, write_json
-from evplace.evaluation import Result
-from evplace.evaluation._evaluate import evaluate
 from evplace.evaluation.charts import accuracy_chart
 from evplace.imaging.traverse import Traverse
-from evplace.localizer import Localizer
-from evplace.matchers.local import Local
-from evplace.placemap import MARK, Items, PlaceMap, train
+from evplace.placemap import MARK, train
 from evplace.places import PlaceGrid
-from evplace.scorers import Learning
-from evplace.scorers.network import GRAPH, Network
-from evplace_lab.city import CitySettings, generate
+from evplace.scorers.network import Network
+from evplace_lab.city import CitySettings, Progress, generate, preview
+from evplace_lab.demonstration import (
+    INPUTS,
+    METHODS,
+    QUICK,
+    USUAL,
+    Row,
+    Street,
+    built_in_drives,
+    python_of,
+    results,
+)
 from evplace_lab.report import report
-
-QUERIES = ("night-1", "rain-1", "day-2", "night-2", "rain-2")
-INPUTS = {"events": "ideal", "colour": "colour"}
-"""Input -> the traverse of each drive that holds it."""
-METHODS = ("best", "paper")
-"""Presets of a whole method: what evplace does by itself, and the paper's network with its Algorithm 1."""
-USUAL_M = 300.0
-"""Length of the street whose networks come with evplace."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,9 @@ class Args:
 
     out: Path = Path("evplace-demo")
     """The folder for the drives, the maps and the results; what is there is gone on with."""
-    drive_m: float = USUAL_M
+    quick: bool = False
+    """By day and at night alone, without rain and the second path."""
+    drive_m: float = USUAL.length_m
     """Length of the street in metres."""
     train: bool = False
     """Train the paper's networks here, in place of those that come with evplace; needs torch."""
@@ -70,36 +68,68 @@ def run(args: Args) -> int:
     """Make the drives, learn the maps, localise the queries, print and keep the answers."""
     if args.live:
         return _live(args)
-    if args.drive_m != USUAL_M and not args.train:
-        raise SettingsError(
-            f"the paper's networks that come with evplace are of the street of {USUAL_M:.0f} m: add --train "
-            "to train others, which needs torch"
-        )
-    drives = built_in_drives(args.out / "city", args.drive_m)
-    rows = [row for name in INPUTS for method in METHODS for row in _rows(args, drives, name, method)]
-    rows.sort(key=lambda row: QUERIES.index(str(row["query"])))
-    with new_file(args.out / "result.json", overwrite=True) as partial:
-        write_json(partial, {"rows": rows, "drive_m": args.drive_m})
+    street, out = _street(args), args.out / "quick" if args.quick else args.out
+    if not args.json:
+        _say_what_comes(street, out)
+    drives = _driven(out, street, shows=not args.json)
+    with progress("looking") as show:
+        rows = list(results(out, drives, street, args.train, show))
+    rows.sort(key=lambda row: street.queries.index(str(row["query"])))
+    with new_file(out / "result.json", overwrite=True) as partial:
+        write_json(partial, {"rows": rows, "drive_m": street.length_m})
     with contextlib.suppress(MissingExtraError):
-        accuracy_chart(rows, args.out / "report.png")
-    page = report(args.out / "results", args.out / "report.html", overwrite=True).page
+        accuracy_chart(rows, out / "report.png")
+    page = report(out / "results", out / "report.html", overwrite=True).page
     if args.json:
         print_json({"rows": rows})
         return 0
-    _print(rows)
-    say(
-        "",
-        _sentence(rows),
-        "",
-        f"To look at: {page}. The same in Python, on your own drives:",
-        "",
-        "  import evplace as ev",
-        f'  day = ev.open_traverse("{args.out}/city/day-1/ideal")',
-        "  street = ev.train(day, ev.PlaceGrid.from_track(day.track, cell_m=20))",
-        f'  night = ev.open_traverse("{args.out}/city/night-1/ideal")',
-        '  print(ev.evaluate(ev.Localizer(street), night).figures["accuracy"])',
-    )
+    _print(rows, street)
+    _say_what_now(rows, page, drives)
+    show_page(page.resolve().as_uri())
     return 0
+
+
+def _street(args: Args) -> Street:
+    """What the flags ask for; SettingsError and MissingExtraError where that cannot be, before any work."""
+    if args.train:
+        Network().require()
+    if args.drive_m != USUAL.length_m and not args.train:
+        raise SettingsError(
+            f"the paper's networks that come with evplace are of the street of {USUAL.length_m:.0f} m: add "
+            "`train` to train others, which needs torch"
+        )
+    return dataclasses.replace(QUICK if args.quick else USUAL, length_m=args.drive_m)
+
+
+def _say_what_comes(street: Street, out: Path) -> None:
+    drives = len(street.queries) + 1
+    say(
+        f"evplace demo: {drives} drives of {street.length_m:.0f} m through a virtual city, by "
+        f"{', '.join(street.conditions)}.",
+        "The first is learned; the others are looked for, by events and by a colour camera, by",
+        "evplace's own method and by the paper's network.",
+        f"About {max(1, round(street.minutes))} min on {os.cpu_count()} cores; all of it is kept in {out}, "
+        "and a call that was stopped goes on there.",
+        "",
+    )
+
+
+def _driven(out: Path, street: Street, shows: bool) -> dict[str, Path]:
+    """The drives, and while they are made a picture of the street."""
+    picture = out / "street.png"
+    out.mkdir(parents=True, exist_ok=True)
+    if shows and not picture.exists():
+        preview(picture, conditions=street.conditions)
+    if shows:
+        say(f"The street, colour above events: {picture}", "")
+        show_page(picture.resolve().as_uri())
+    with progress("driving through the city") as show:
+        return built_in_drives(out / "city", street, lambda at: _show(show, at))
+
+
+def _show(show: Show, at: Progress) -> None:
+    """The city's own progress, in thousandths."""
+    show(round(at.share * 1000), 1000, at.drive)
 
 
 def _live(args: Args) -> int:
@@ -112,7 +142,13 @@ def _live(args: Args) -> int:
         fps=60, sensors=("ideal",), route_length_m=args.drive_m, conditions=("day", "night"), paths=(1,),
         keep_events=True,
     )  # fmt: skip
-    drives = _driven(args.out / "live", settings)
+    say(
+        f"evplace demo: a drive of {args.drive_m:.0f} m through a virtual city by day, which is learned, and "
+        "one at night, which is looked for as it goes; a minute or two, then a page."
+    )
+    with progress("driving through the city") as show:
+        paths = generate(args.out / "live", settings, progress=lambda at: _show(show, at))
+    drives = {path.name: path for path in paths}
     place_map = args.out / "live.evp"
     if not (place_map / MARK).exists():
         reference = Traverse.load(drives["day-1"] / INPUTS["events"])
@@ -124,91 +160,12 @@ def _live(args: Args) -> int:
     )
 
 
-def built_in_drives(folder: Path, drive_m: float) -> dict[str, Path]:
-    """The drives that everybody has: name -> folder with a traverse for each input."""
-    return _driven(folder, CitySettings(fps=60, sensors=("ideal",), route_length_m=drive_m))
-
-
-def _driven(folder: Path, settings: CitySettings) -> dict[str, Path]:
-    with progress("driving through the city") as show:
-        paths = generate(folder, settings, progress=lambda at: show(round(at.share * 1000), 1000, at.drive))
-    return {path.name: path for path in paths}
-
-
-def _rows(args: Args, drives: dict[str, Path], name: str, method: str) -> Iterator[dict[str, object]]:
-    """How one method finds all queries by one input."""
-    reference = Traverse.load(drives["day-1"] / INPUTS[name])
-    place_map = _map(args, reference, name, method)
-    with progress(f"{method} on {name}") as show:
-        for number, query in enumerate(QUERIES):
-            traverse = Traverse.load(drives[query] / INPUTS[name])
-            result = evaluate(Localizer(place_map), traverse, rule="view", reference=reference)
-            result.save(args.out / "results" / f"{query} {name} {method}", overwrite=True)
-            show(number + 1, len(QUERIES), query)
-            yield _row(query, name, method, result)
-
-
-def _map(args: Args, reference: Traverse, name: str, method: str) -> PlaceMap:
-    """The map of one method and input; one that is there already is read."""
-    file = args.out / f"{name} {method}.evp"
-    if (file / MARK).exists():
-        return PlaceMap.load(file)
-    assert reference.track is not None  # the city knows where it is
-    places = PlaceGrid.from_track(reference.track)
-    if method == "paper" and not args.train:
-        place_map = _map_of_network(reference, places, name)
-    else:
-        with progress(f"learning {name}") as show:
-            learning = Learning(functools.partial(_step, show), args.out / f".{name}.checkpoint")
-            place_map = train(reference, places, preset=method, learning=learning)
-    place_map.save(file)
-    return place_map
-
-
-def _map_of_network(reference: Traverse, places: PlaceGrid, name: str) -> PlaceMap:
-    """The paper's network of the usual street as it comes with evplace."""
-    track = reference.track
-    assert track is not None
-    graph = (resources.files("evplace_lab.cli") / "networks" / f"{name}.onnx").read_bytes()
-    return PlaceMap(
-        Network.presets["paper"],
-        places,
-        Items(np.arange(places.n), places.centres(), np.full(places.n, np.nan), are_places=True),
-        np.column_stack([reference.xy, track.heading_deg]),
-        {GRAPH: graph},
-        reference.images.shape[1:],
-        reference.recipe,
-        (track.zone, track.northern),
-        matcher=Local.presets["paper"],
-    )
-
-
-def _step(show: Show, step: int, steps: int, loss: float) -> None:
-    show(step, steps, f"loss {loss:.2f}")
-
-
-def _row(query: str, name: str, matcher: str, result: Result) -> dict[str, object]:
-    figures = result.figures
-    return {
-        "query": query,
-        "input": name,
-        "matcher": matcher,
-        "accuracy": figures["accuracy"],
-        "accuracy_seen": figures["accuracy_seen"],
-        "rejected": figures["rejection_rate"],
-        "unseen_rejected": figures["unseen_rejected"],
-        "chance": figures["chance"],
-        "chance_seen": figures["chance_seen"],
-        "n": figures["judged"],
-    }
-
-
-def _print(rows: list[dict[str, object]]) -> None:
+def _print(rows: list[Row], street: Street) -> None:
     """A line a query: each method on each input, of all images and of those whose place the map has."""
     by_key = {(row["query"], row["input"], row["matcher"]): row for row in rows}
     kinds = list(itertools.product(METHODS, INPUTS))
     table = []
-    for query in QUERIES:
+    for query in street.queries:
         cells = [by_key[query, name, method] for method, name in kinds]
         shown = [cell[figure] for figure in ("accuracy", "accuracy_seen") for cell in cells]
         table.append([query, *map(_percent, shown), _percent(cells[0]["chance_seen"])])
@@ -221,21 +178,41 @@ def _print(rows: list[dict[str, object]]) -> None:
     )
 
 
-def _sentence(rows: list[dict[str, object]]) -> str:
+def _say_what_now(rows: list[Row], page: Path, drives: dict[str, Path]) -> None:
+    """The verdict, where to look, and what to do with recordings of one's own."""
+    say(
+        "",
+        verdict(rows),
+        "",
+        f"To look at: {page}",
+        "",
+        "With your own recordings, an event camera's file and a GPS log of each drive:",
+        "",
+        "  evplace train day.aedat4 --track day.nmea -o street.evp",
+        "  evplace evaluate street.evp night.aedat4 --track night.nmea -o night.result",
+        "  evplace report night.result",
+        "",
+        "The same in Python, on the demo's own drives:",
+        "",
+        *(f"  {line}" for line in python_of(drives)),
+    )
+
+
+def verdict(rows: list[Row]) -> str:
     """What was seen, in words."""
     share = {(row["query"], row["input"], row["matcher"]): row["accuracy_seen"] for row in rows}
     night = {kind: _percent(share["night-1", *kind]) for kind in itertools.product(INPUTS, METHODS)}
-    best = [row for row in rows if row["matcher"] == "best" and row["input"] == "events"]
-    called = [float(str(row["unseen_rejected"])) for row in best if row["unseen_rejected"] is not None]
     found = (
         f"At night, events find {night['events', 'best']} % of the street's images and colour "
         f"{night['colour', 'best']} %; the paper's method finds {night['events', 'paper']} and "
-        f"{night['colour', 'paper']} %."
+        f"{night['colour', 'paper']} %"
     )
+    best = [row for row in rows if row["matcher"] == "best" and row["input"] == "events"]
+    called = [float(str(row["unseen_rejected"])) for row in best if row["unseen_rejected"] is not None]
     if not called:
-        return found
+        return f"{found}."
     return (
-        f"{found} On the other path, {_percent(sum(called) / len(called))} % of the images of streets that "
+        f"{found}. On the other path, {_percent(sum(called) / len(called))} % of the images of streets that "
         "the map has never seen were called just that."
     )
 

@@ -24,13 +24,14 @@ import tyro
 
 from evplace.cli._output import print_json, print_table, progress, say
 from evplace.cli._settings import Pairs, a_part_of
+from evplace.cli._workers import WorkerFlags
 from evplace.core import families
 from evplace_lab.reproduction import Choice, reproduce
 from evplace_lab.reproduction._recipes import read_methods
 
 
 @dataclass(frozen=True)
-class Args:
+class Args(WorkerFlags):
     """Flags of `evplace reproduce`."""
 
     name: Annotated[tyro.conf.Positional[str], a_part_of("reproduction")]
@@ -40,7 +41,7 @@ class Args:
     city: Path | None = None
     """Drives that `evplace city` made; without them the benchmark is made in OUT/city."""
     data: Path | None = None
-    """For real: the folder of real sets; its recipes say which, and where in it each lies."""
+    """For real and figure5: the folder of real sets; the recipes say which, and where in it each lies."""
     seeds: int = 3
     """Trainings of each network."""
     inputs: tuple[str, ...] = ()
@@ -50,8 +51,6 @@ class Args:
     methods: Path | None = None
     """For table2, figure5 and real: a TOML file of further methods, a table each with scorer and matcher, and
     where they are not the defaults preset, settings, scorer_settings, every. Parts of other packages too."""
-    workers: int | None = None
-    """Processes; one a core if not given. They do not change the result."""
     json: bool = False
     """Print one JSON object."""
 
@@ -60,8 +59,8 @@ def run(args: Args) -> int:
     """Run what is missing, print the tables."""
     own = {} if args.methods is None else read_methods(args.methods)
     choice = Choice(args.seeds, dict(args.set), args.inputs, own)
-    with progress(args.name) as show:
-        document = reproduce(args.name, args.out, args.city, args.data, choice, args.workers, show)
+    with args.opened_workers() as workers, progress(args.name) as show:
+        document = reproduce(args.name, args.out, args.city, args.data, choice, workers, show)
     if args.json:
         print_json(document)
         return 0

@@ -15,7 +15,12 @@ HIDDEN = 0.4
 
 
 def augmented(images: Tensor) -> Tensor:
-    """(n, 45, 80) in 0 to 255 -> the same; all is drawn from torch's random state."""
+    """(n, 45, 80) in 0 to 255 -> the same, on its device; all is drawn from torch's random state."""
+    with images.device:
+        return _seen_worse(images)
+
+
+def _seen_worse(images: Tensor) -> Tensor:
     x = _moved(images)
     x = x * (torch.rand(x.shape) >= 0.35 * _for_some(x, 0.5))
     noise = 0.08 * _for_some(x, 0.5) ** 2

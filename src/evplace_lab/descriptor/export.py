@@ -12,7 +12,16 @@ from evplace.core.storage import new_file, write_json
 from evplace.scorers._network.network_onnx import Graph, Port
 from evplace.scorers._reduction import reduction
 from evplace.scorers.trained import ABOUT, INPUT, OUTPUT, WEIGHTS
-from evplace_lab.descriptor.network import DIMENSIONS, FLOOR, LAYERS, POOLED, SHARP, WIDE, Weights
+from evplace_lab.descriptor.network import (
+    ADDED,
+    DIMENSIONS,
+    FLOOR,
+    LAYERS,
+    POOLED,
+    SHARP,
+    WIDE,
+    Weights,
+)
 from evplace_lab.descriptor.sensors import SIZE
 
 COLUMNS, ROWS = SIZE
@@ -32,8 +41,8 @@ def onnx_bytes(weights: Weights) -> bytes:
             x = graph.add("MaxPool", [x], kernel_shape=[2, 2], strides=[2, 2], ceil_mode=1)
         kernel, bias = _folded(weights, number)
         inputs = [x, _half(graph, f"kernel{number}", kernel), _half(graph, f"bias{number}", bias)]
-        x = graph.add("Conv", inputs, pads=[side // 2] * 4, strides=[stride, stride])
-        x = graph.add("Relu", [x])
+        said = graph.add("Conv", inputs, pads=[side // 2] * 4, strides=[stride, stride])
+        x = graph.add("Relu", [graph.add("Add", [x, said]) if number in ADDED else said])
     last, full = (
         [_half(graph, f"{name}.{part}", weights[f"{name}.{part}"]) for part in ("weight", "bias")]
         for name in ("last", "full")

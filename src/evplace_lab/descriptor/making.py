@@ -17,13 +17,13 @@ import numpy as np
 
 from evplace.core.settings import to_dict
 from evplace.core.storage import read_json
-from evplace.core.workers import run_all
+from evplace.core.workers import Workers, run_all
 from evplace.scorers import Learning
 from evplace.scorers.trained import ABOUT, WEIGHTS, DescriptorGraph
 from evplace_lab.descriptor.bursts import Bursts, BurstSettings, is_hall
 from evplace_lab.descriptor.judging import recalls
 
-VERSION = 2
+VERSION = 3
 """Counts up whenever the same settings give other images or other weights."""
 UNSEEN = (201, 202, 203)
 """Seeds of two towns and of halls that no training sees."""
@@ -35,7 +35,7 @@ Progress = Callable[[int, int, str], None]
 class Recipe:
     """What the shipped weights were made with."""
 
-    towns: int = 48
+    towns: int = 44
     """Seeds of towns and halls to train on, from 0."""
     bursts: BurstSettings = field(default_factory=BurstSettings)
     """How much is made of each."""
@@ -48,8 +48,8 @@ class Recipe:
         return hashlib.sha256(f"{VERSION} {self.bursts}".encode()).hexdigest()[:12]
 
 
-def make_towns(folder: Path, recipe: Recipe, workers: int, progress: Progress) -> None:
-    """All towns that are not there yet, `workers` processes at a time."""
+def make_towns(folder: Path, recipe: Recipe, workers: Workers, progress: Progress) -> None:
+    """All towns that are not there yet."""
     seeds = [*range(recipe.towns), *UNSEEN]
     todo = [seed for seed in seeds if not town_file(folder, recipe, seed).exists()]
     jobs = [
@@ -63,7 +63,7 @@ def make_towns(folder: Path, recipe: Recipe, workers: int, progress: Progress) -
         done += 1
         progress(done, len(seeds), line)
 
-    run_all("evplace_lab.descriptor.worker", jobs, workers, said)
+    run_all("evplace_lab.descriptor.worker", jobs, workers, folder / "towns", said)
 
 
 def town_file(folder: Path, recipe: Recipe, seed: int) -> Path:
@@ -74,7 +74,7 @@ def town_file(folder: Path, recipe: Recipe, seed: int) -> Path:
 def train_seed(folder: Path, recipe: Recipe, seed: int, progress: Progress) -> dict[str, Any]:
     """One training, kept in `folder/seed-N`; returns what its file says."""
     from evplace_lab.descriptor.export import write_descriptor
-    from evplace_lab.descriptor.training import TrainingSettings, as_arrays, train_descriptor
+    from evplace_lab.descriptor.training import TrainingSettings, as_arrays, device_name, train_descriptor
 
     out = folder / f"seed-{seed}"
     wanted = {"version": VERSION, "seed": seed, "recipe": to_dict(recipe)}
@@ -83,7 +83,7 @@ def train_seed(folder: Path, recipe: Recipe, seed: int, progress: Progress) -> d
         if {key: found.get(key) for key in wanted} == wanted:
             return found
     towns = [Bursts.load(town_file(folder, recipe, number)) for number in range(recipe.towns)]
-    began = time.process_time()
+    began = time.monotonic()
     watched = Learning(
         lambda step, steps, loss: progress(step, steps, f"seed {seed}, loss {loss:.3f}"),
         out / "training.safetensors",
@@ -91,7 +91,7 @@ def train_seed(folder: Path, recipe: Recipe, seed: int, progress: Progress) -> d
     network = train_descriptor(
         towns, TrainingSettings(steps=recipe.steps, seed=seed), watched, f"{VERSION} {recipe}"
     )
-    about = wanted | {"cpu_s": round(time.process_time() - began)}
+    about = wanted | {"device": device_name(), "seconds": round(time.monotonic() - began)}
     write_descriptor(out, as_arrays(network), about)
     return read_json(out / ABOUT, "the description of a descriptor")
 

@@ -3,10 +3,11 @@
     image (45, 80) -> root -> against its surroundings        contrast, whatever the number of events
                    -> conv 5x5 / 2, 32 -> conv 3x3, 64        (64, 23, 40)
                    -> max-pool 2 -> conv 3x3, 96 -> conv 3x3, 128      (128, 12, 20)
-                   -> max-pool 2 -> conv 3x3, 128 -> conv 1x1, 32      (32, 6, 10)
-                   -> flatten -> 256, of length 1
+                   -> max-pool 2 -> conv 3x3, 128              (128, 6, 10)
+                   -> twice: what a conv 3x3, 128 says is added
+                   -> conv 1x1, 16 -> flatten -> 256, of length 1
 
-Each convolution but the last has a batch norm and a ReLU. 0.83 million weights.
+Each convolution but the last has a batch norm and a ReLU. 0.88 million weights.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ except ModuleNotFoundError as error:
     raise MissingExtraError("torch", "train", "training the descriptor") from error
 
 Weights = dict[str, NDArray[np.float32]]
-LAYERS = ((1, 32, 5, 2), (32, 64, 3, 1), (64, 96, 3, 1), (96, 128, 3, 1), (128, 128, 3, 1))
+LAYERS = ((1, 32, 5, 2), (32, 64, 3, 1), (64, 96, 3, 1), (96, 128, 3, 1), *3 * ((128, 128, 3, 1),))
 """Channels in and out, side of the kernel and stride of each convolution with batch norm."""
-POOLED = (2, 4)
-"""Before these convolutions the image is halved."""
-LAST, DIMENSIONS = 32, 256
+POOLED, ADDED = (2, 4), (5, 6)
+"""Before these convolutions the image is halved; what these ones say is added to what they are given."""
+LAST, DIMENSIONS = 16, 256
 SHARP, WIDE = 0.7, 10.0
 """Standard deviations in pixels: of the blur, and of what a pixel is compared with."""
 FLOOR = 0.15
@@ -80,5 +81,6 @@ class DescriptorNetwork(nn.Module):
         for number, (convolution, norm) in enumerate(zip(self.convolutions, self.norms, strict=True)):
             if number in POOLED:
                 x = torch.max_pool2d(x, 2, ceil_mode=True)
-            x = torch.relu(norm(convolution(x)))
+            said = norm(convolution(x))
+            x = torch.relu(x + said if number in ADDED else said)
         return nn.functional.normalize(self.full(self.last(x).flatten(1)).float(), dim=1)

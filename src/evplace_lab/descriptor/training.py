@@ -8,7 +8,7 @@ run that was killed ends in the same weights.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ from torch.nn.functional import softplus
 from evplace.scorers import Learning
 from evplace.scorers._network.checkpoint import Checkpoint
 from evplace_lab.descriptor.augmentation import augmented
-from evplace_lab.descriptor.batches import Batch, draw_batch
+from evplace_lab.descriptor.batches import Batch, Routes, draw_batch
 from evplace_lab.descriptor.bursts import Bursts
 from evplace_lab.descriptor.network import DescriptorNetwork
 
@@ -39,7 +39,7 @@ class TrainingSettings:
 
     steps: int = 7000
     """Steps of one batch each."""
-    routes: int = 8
+    routes: int = 32
     """Routes in a batch."""
     places: int = 8
     """Places of each route, each in every drive."""
@@ -54,12 +54,16 @@ class TrainingSettings:
 
 
 def train_descriptor(
-    towns: Sequence[Bursts], settings: TrainingSettings, learning: Learning, run: str = ""
+    towns: Iterable[Bursts], settings: TrainingSettings, learning: Learning, run: str = ""
 ) -> DescriptorNetwork:
-    """Train on `towns`; `run` says what they are, so that a checkpoint of others is passed over."""
+    """Train on `towns`, on a GPU where there is one; `run` says what the towns are, so that a checkpoint of
+    others is passed over.
+    """
+    device = _device()
+    routes = Routes.of(towns, device)
     torch.manual_seed(settings.seed)
     network = DescriptorNetwork()
-    network.to(memory_format=torch.channels_last)  # type: ignore[call-overload] # which it has
+    network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload] # which it has
     optimiser = torch.optim.AdamW(
         network.parameters(), settings.learning_rate, weight_decay=settings.weight_decay
     )
@@ -69,7 +73,7 @@ def train_descriptor(
     for step in range(first, settings.steps):
         for group in optimiser.param_groups:
             group["lr"] = settings.learning_rate * _pace((step + 1) / settings.steps)
-        loss = _loss_of(network, towns, settings, step)
+        loss = _loss_of(network, routes, settings, step)
         optimiser.zero_grad(set_to_none=True)
         loss.backward()  # type: ignore[no-untyped-call]
         optimiser.step()
@@ -78,16 +82,23 @@ def train_descriptor(
         saved.keep(step + 1, network, optimiser)
     saved.remove()
     network.eval()
-    return network
+    return network.cpu()
 
 
-def _loss_of(
-    network: DescriptorNetwork, towns: Sequence[Bursts], settings: TrainingSettings, step: int
-) -> Tensor:
-    batch = draw_batch(towns, settings.seed, step, settings.routes, settings.places)
+def _device() -> str:
+    return "cuda" if torch.cuda.is_available() else "cpu"
+
+
+def device_name() -> str:
+    """What trains: the name of a GPU, or "cpu"."""
+    return torch.cuda.get_device_name() if _device() == "cuda" else "cpu"
+
+
+def _loss_of(network: DescriptorNetwork, routes: Routes, settings: TrainingSettings, step: int) -> Tensor:
+    batch = draw_batch(routes, settings.seed, step, settings.routes, settings.places)
     torch.manual_seed(settings.seed * 1_000_003 + step)
-    images = augmented(torch.from_numpy(batch.images.astype(np.float32)))
-    with torch.autocast("cpu", torch.bfloat16, enabled=settings.bfloat16):
+    images = augmented(batch.images)
+    with torch.autocast(images.device.type, torch.bfloat16, enabled=settings.bfloat16):
         vectors = network(images)
     return info_nce(vectors, batch)
 
@@ -103,14 +114,14 @@ def info_nce(vectors: Tensor, batch: Batch) -> Tensor:
 
 def _pairs(batch: Batch) -> tuple[Tensor, Tensor]:
     """(n, n) which two images are of one place, and which are not."""
-    poses, route = torch.from_numpy(batch.poses).double(), torch.from_numpy(batch.route)
+    poses, route = batch.poses.double(), batch.route
     apart = torch.cdist(poses[:, :2], poses[:, :2])
     turned = torch.remainder(poses[:, None, 2] - poses[None, :, 2] + math.pi, 2 * math.pi) - math.pi
     degrees = torch.rad2deg(turned.abs())
     one_route = route[:, None] == route[None]
     same = one_route & (apart <= SAME_M) & (degrees <= SAME_DEG)
     other = ~one_route | (apart > OTHER_M) | (degrees > OTHER_DEG)
-    return same & ~torch.eye(len(route), dtype=torch.bool), other
+    return same & ~torch.eye(len(route), dtype=torch.bool, device=route.device), other
 
 
 def _pace(share: float) -> float:

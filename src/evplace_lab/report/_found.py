@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from evplace.core.errors import InputError
+from evplace.core.folders import RESULT, instead
 from evplace.core.storage import read_json
 from evplace.evaluation import Result
 
@@ -130,8 +131,9 @@ def look(folder: Path) -> Found:
     )
     if not (found.table or found.real or found.curves or found.ablations or found.results):
         raise InputError(
-            f"{folder} holds nothing to report on: give a result that `evplace evaluate` wrote, or a folder "
-            "of such results"
+            instead(folder, RESULT)
+            or f"{folder} holds nothing to report on: give a result that `evplace evaluate` wrote, or a "
+            "folder of such results"
         )
     return found
 

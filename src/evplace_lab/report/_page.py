@@ -19,7 +19,7 @@ from evplace_lab.report import _tables
 from evplace_lab.report._found import Found, Sheet
 from evplace_lab.report._html import Html, join, tag
 from evplace_lab.report._panels import Line, Panel, panels, result_line
-from evplace_lab.report._pictures import Shown, sample_images
+from evplace_lab.report._pictures import Shown, sample_images, similarity_image
 from evplace_lab.report._reliability import drawings
 
 SCRIPTS = ("plots.js", "page.js")
@@ -32,6 +32,7 @@ def page(found: Found, remark: str | None = None) -> str:
     drawn = panels(found)
     parts = {
         "title": join(found.name),
+        "subtitle": tag("p", _tables.subtitle(found), class_="subtitle"),
         "remark": tag("p", remark, class_="remark") if remark else "",
         "headline": _tables.headline(found),
         "sections": _sections(found, drawn),
@@ -51,7 +52,9 @@ def _sections(found: Found, drawn: list[Panel]) -> Html:
     return join(
         _accuracies("table", table, "Accuracy") if table else None,
         _accuracies("real", found.real, "Accuracy on real sets") if found.real else None,
-        _section("curves", "Precision and recall", tag("div", id="panels")) if drawn else None,
+        _section("curves", "Precision and recall", tag("div", id="panels"), _tables.lacking(found))
+        if drawn
+        else None,
         _section("reliability", "Reliability", reliable) if reliable else None,
         _section("ablations", "Ablations", _tables.ablations(changes.rows)) if changes else None,
         _section("look", "A closer look", tag("div", id="look-at")) if results else None,
@@ -99,6 +102,7 @@ def _data(found: Found, drawn: list[Panel]) -> dict[str, Any]:
     return {
         "panels": [{"title": one.title, "lines": [_line(line) for line in one.lines]} for one in drawn],
         "outcomes": OUTCOMES,
+        "best": _tables.best_of(found.results),
         "results": results,
         "positions": positions.kept,
     }
@@ -119,6 +123,7 @@ def _result(name: str, result: Result, positions: _Positions, shown: Shown) -> d
         "query_xy": positions.add(result.query_xy),
         "item_xy": positions.add(result.item_xy),
         "samples": shown,
+        "similarity": similarity_image(result),
     }
 
 

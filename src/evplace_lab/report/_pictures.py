@@ -15,7 +15,7 @@ from evplace.imaging.sheets import as_shown
 
 BUDGET = 12_000_000
 """Characters of all images in a page."""
-LEVELS = {"grey": 16, "colours": 128}
+LEVELS = {"grey": 16, "colours": 128, "matrix": 32}
 """Shades that a shown image keeps: enough for the eye, and half the size or less."""
 
 Shown = list[tuple[int, list[str]]]
@@ -56,18 +56,36 @@ def _evenly(samples: Shown, many: int) -> Shown:
 def _are_events(settings: Mapping[str, Any]) -> bool:
     """Whether the map was made of event images."""
     of_map = settings.get("map")
-    return isinstance(of_map, Mapping) and of_map.get("input") == "events"
+    recipe = of_map.get("recipe") if isinstance(of_map, Mapping) else None
+    return isinstance(recipe, Mapping) and recipe.get("kind") == "events"
+
+
+def similarity_image(result: Result) -> str:
+    """A result's similarities as a plot has them, queries to the right and items upwards; empty without."""
+    if result.similarity is None:
+        return ""
+    return _png(255 - result.similarity.T[::-1], LEVELS["matrix"])
 
 
 def _source(image: NDArray[np.uint8], events: bool) -> str:
     """An image (h, w) or (h, w, C) as the address of a PNG that holds itself."""
+    shown = as_shown(_stretched(image) if events else image, events)
+    grey = bool(np.all(shown == shown[..., :1]))
+    return _png(shown[..., 0] if grey else shown, LEVELS["grey" if grey else "colours"])
+
+
+def _stretched(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """An event image whose strongest pixel is full: few events of many counts are seen, too."""
+    strongest = int(image.max(initial=0))
+    return image if strongest in (0, 255) else (image.astype(np.uint16) * 255 // strongest).astype(np.uint8)
+
+
+def _png(shown: NDArray[np.uint8], levels: int) -> str:
+    """An image (h, w) or (h, w, 3) as an address."""
     from PIL import Image
 
-    shown = as_shown(image, events)
-    grey = bool(np.all(shown == shown[..., :1]))
-    picture = Image.fromarray(shown[..., 0] if grey else shown)
+    picture = Image.fromarray(np.ascontiguousarray(shown))
     file = io.BytesIO()
-    levels = LEVELS["grey" if grey else "colours"]
     # Pillow's median cut takes 20 times as long for a difference that is not seen at this size.
-    picture.quantize(levels, None if grey else Image.Quantize.FASTOCTREE).save(file, "PNG")
+    picture.quantize(levels, None if shown.ndim == 2 else Image.Quantize.FASTOCTREE).save(file, "PNG")
     return "data:image/png;base64," + base64.b64encode(file.getvalue()).decode("ascii")

@@ -33,6 +33,39 @@ def headline(found: Found) -> Html:
     return tag("div", *(_tile(*one) for one in _headline_figures(found)), class_="tiles")
 
 
+def best_of(results: Mapping[str, Result]) -> int:
+    """The number of the result with the highest accuracy, the first of equal ones; 0 without any."""
+    shares = [result.figures.get("accuracy") or 0.0 for result in results.values()]
+    return shares.index(max(shares)) if shares else 0
+
+
+def subtitle(found: Found) -> str:
+    """What the page is about, in a sentence."""
+    results = list(found.results.values())
+    if len(results) == 1:
+        return _about_one(results[0])
+    parts = []
+    if found.table is not None or found.real is not None or found.curves is not None:
+        parts.append("Tables and curves of methods side by side")
+    if found.ablations is not None:
+        parts.append("what single changes do")
+    if results:
+        timings = ", ".join(dict.fromkeys(TIMINGS.get(one.timing, one.timing) for one in results))
+        parts.append(f"{len(results)} results ({timings} answers), of which the best is opened below")
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _about_one(result: Result) -> str:
+    figures, settings = result.figures, flat(result.settings)
+    found = f"{percent(figures['accuracy'])} % of {figures['judged']:,} images answered rightly"
+    by = [str(settings[key]) for key in ("map.scorer.name", "matcher.name") if settings.get(key)]
+    method = f", by {' and '.join(by)}" if by else ""
+    query = f" of {settings['query']}" if settings.get("query") else ""
+    timing = TIMINGS.get(result.timing, result.timing)
+    return f"{found}{query}{method}; {timing} answers against a map of {figures['items']:,} items."
+
+
 def accuracies(rows: Sequence[TableRow]) -> Html:
     """A table as the paper's Table 2: a block for each matcher, all rules, of which one is shown."""
     rules = list(dict.fromkeys(row.rule for row in rows))
@@ -68,6 +101,20 @@ def ablations(rows: Sequence[Ablation]) -> Html:
         for row in ranked
     ]  # fmt: skip
     return _scrolled("Ablations", tag("table", head, tag("tbody", *body)))
+
+
+def lacking(found: Found) -> Html:
+    """A panel for each curve's data that are not there, which says what it needs and what to do then."""
+    told = found.curves.rest.get("lacking") if found.curves is not None else None
+    panels = []
+    for one in told if isinstance(told, list) else []:
+        if isinstance(one, dict):
+            needs = f"Needs data: {one.get('needs', '')}"
+            command = tag("code", str(one.get("command", "")))
+            panels.append(
+                tag("div", tag("h3", str(one.get("panel", ""))), tag("p", needs), command, class_="panel")
+            )
+    return tag("div", *panels, class_="grid-2 lacking") if panels else Html()
 
 
 def overview(results: Mapping[str, Result]) -> Html:

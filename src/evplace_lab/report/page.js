@@ -90,6 +90,35 @@ function itemsPlot(place, result, show) {
   return (query) => plot.mark((plot.query = query));
 }
 
+// How far each item stands out at each query, the darker the further, and the path of the answers over it.
+function similarityPlot(place, result, show) {
+  const canvas = element("div", { class: "canvas" });
+  place.append(canvas, legend([["accepted answers", "var(--accent)"]]));
+  const plot = {};
+  drawn(canvas, (width) => {
+    const height = Math.min(360, Math.max(240, width * 0.6));
+    const count = result.item.length;
+    const items = result.figures.items;
+    const x = { low: 0, high: Math.max(1, count - 1), step: niceStep(count, width / 90), name: "query" };
+    const y = { low: 0, high: Math.max(1, items - 1), step: niceStep(items, 6), name: "map item" };
+    const { picture, atX, atY } = axes(canvas, { width, height }, x, y);
+    picture.setAttribute("aria-label", "Similarity of each query with each map item, and the accepted answers");
+    const box = { x: atX(0), y: atY(y.high), width: atX(x.high) - atX(0), height: atY(0) - atY(y.high) };
+    svg("image", { ...box, href: result.similarity, preserveAspectRatio: "none", class: "matrix" }, picture);
+    const accepted = result.item.flatMap((item, query) =>
+      (item >= 0 && [named("right"), named("wrong")].includes(result.outcome[query]) ? [[atX(query), atY(item)]] : []));
+    dots(picture, accepted, { stroke: "var(--accent)", "stroke-width": 2 });
+    const line = svg("line", { y1: atY(y.high), y2: atY(0), class: "cursor" }, picture);
+    plot.mark = (query) => { for (const end of ["x1", "x2"]) line.setAttribute(end, atX(query)); };
+    whilePointing(picture, (at) => {
+      const share = (at - atX(0)) / (atX(x.high) - atX(0));
+      show(Math.round(Math.min(1, Math.max(0, share)) * (count - 1)));
+    });
+    if (plot.query !== undefined) plot.mark(plot.query);
+  });
+  return (query) => plot.mark((plot.query = query));
+}
+
 // The drive from above, north up and as wide as high a metre, coloured by error.
 function routePlot(place, result, far, show) {
   const here = data.positions[result.query_xy];
@@ -129,6 +158,11 @@ function routePlot(place, result, far, show) {
     }
     for (const { band: number, queries } of stretches) {
       dots(picture, queries.map((query) => at(here[query])), { stroke: `var(--e${number})`, "stroke-width": 6 });
+    }
+    // From where the camera was to where it was taken to be.
+    for (const query of placed.filter((one) => accepted(one) && far[one] !== null && far[one] >= ERROR_EDGES_M[0])) {
+      const [[x1, y1], [x2, y2]] = [at(here[query]), at(there[result.item[query]])];
+      svg("line", { x1, y1, x2, y2, class: "off" }, picture);
     }
     scaleBar(picture, height - 12, width, scale);
     const arrow = svg("g", { class: "north", transform: `translate(${width - 16} ${height - 34})` }, picture);
@@ -196,9 +230,16 @@ function figures(result) {
     ["precision", "precision"], ["recall", "recall"], ["chance", "chance"]];
   const tiles = shown.map(([key, name]) =>
     element("div", { class: "tile" }, element("strong", {}, percent(result.figures[key])), element("span", {}, name)));
-  const answers = element("div", { class: "tile" }, element("strong", {}, result.answers), element("span", {}, "answers"));
-  return element("div", { class: "tiles small" }, answers, ...tiles);
+  const tile = (value, words) => element("div", { class: "tile" }, element("strong", {}, value), element("span", {}, words));
+  const count = result.item.length;
+  const took = result.took_s === null ? [] : [tile(`${short((1000 * result.took_s) / count)} ms`, "an image, all in all")];
+  return element("div", { class: "tiles small" }, tile(result.answers, "answers"), ...tiles, ...took);
 }
+
+const NOTHING = "No answer was accepted: the method stood by none of them. Either the drive is not on the map, or its " +
+  "images differ too much from the map's; answers with a lag (--lag-s 2), a higher --false-accept, or evplace doctor may help.";
+const nothingAccepted = (result) =>
+  !result.outcome.some((kind) => kind === named("right") || kind === named("wrong"));
 
 function panel(title, kind, fill) {
   const place = element("div", { class: `panel ${kind}` }, element("h3", {}, title));
@@ -225,14 +266,16 @@ function look(place, result) {
     panel("Along the drive", "wide", (inside) => marks.push(itemsPlot(inside, result, show))),
     result.query_xy === null ? null
       : panel("From above: how far off", "", (inside) => marks.push(routePlot(inside, result, far, show))),
+    result.similarity ? panel("Similarity, and the path", "", (inside) => marks.push(similarityPlot(inside, result, show))) : null,
     panel("Precision and recall", "", (inside) => curvePlot(inside, { title: result.name, lines: [result.curve] })),
   ].filter((part) => part !== null);
   const took = result.took_s === null ? "" : `, ${short(result.took_s)} s`;
-  const details = element("details", {}, element("summary", {}, `Settings, versions and all figures${took}`),
+  const details = element("details", { open: "" }, element("summary", {}, `Settings, versions and all figures${took}`),
     element("h3", {}, "Figures"), pairs(result.figures), element("h3", {}, "Settings"), pairs(result.settings),
     element("h3", {}, "Versions"), pairs(result.versions));
   place.replaceChildren(
     figures(result),
+    ...(nothingAccepted(result) ? [element("p", { class: "remark" }, NOTHING)] : []),
     element("div", { class: "along" }, slider, readout),
     element("div", { class: "grid-2" }, ...parts.map(([made]) => made)),
     ...(result.samples.length ? [element("h3", {}, "Sample matches"), samples(result)] : []),
@@ -248,7 +291,8 @@ function closerLook(place) {
   const inside = element("div", { id: "looked-at" });
   place.append(element("label", { for: "which" }, "Result "), select, inside);
   select.addEventListener("change", () => look(inside, data.results[select.selectedIndex]));
-  look(inside, data.results[0]);
+  select.selectedIndex = data.best;
+  look(inside, data.results[data.best]);
 }
 
 ruleSwitch();

@@ -10,7 +10,6 @@ that needs nothing holds `document(out, choice, workers, progress)` in place of 
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -22,12 +21,14 @@ from evplace.core import families
 from evplace.core.errors import InputError, SettingsError
 from evplace.core.settings import to_dict
 from evplace.core.storage import locked, new_file, write_json
-from evplace.core.workers import run_all
+from evplace.core.workers import Workers, run_all, workers_of
 from evplace.evaluation import versions
+from evplace.scorers import require
 from evplace_lab.city import Progress as CityProgress
 from evplace_lab.city import generate
 from evplace_lab.reproduction._cases import Case, Method
 from evplace_lab.reproduction._cities import Cities
+from evplace_lab.reproduction._panels import Panels
 from evplace_lab.reproduction._real_sets import RealSets
 from evplace_lab.reproduction._runs import Runs
 
@@ -71,34 +72,37 @@ def reproduce(
     city: str | Path | None = None,
     data: str | Path | None = None,
     choice: Choice | None = None,
-    workers: int | None = None,
+    workers: int | Workers | None = None,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Make a table or figure and write `out/NAME.json`; returns what it holds.
 
     `city` is a folder of `evplace city`; without one, the benchmark is made in `out/city`. `data` is a folder
-    of real sets, which the table `real` is made of. `workers` processes are used (None: one a core); they do
-    not change the result. Raises SettingsError for an unknown name, InputError where a drive is lacking,
-    OutputError where another process writes `out`.
+    of real sets, which the table `real` is made of. `workers` is how many processes are used (None: one a
+    core), or where; they do not change the result. Raises SettingsError for an unknown name, InputError where
+    a drive is lacking, OutputError where another process writes `out`.
     """
     folder, chosen = Path(out), choice or Choice()
     family = families.load("reproduction", name)
-    count = (os.cpu_count() or 1) if workers is None else workers
-    _check(name, family, chosen, count)
+    used = workers_of(workers)
+    _check(name, family, chosen)
     began = time.monotonic()
     if family.NEEDS == "nothing":
         with locked(folder / "reproduce"):
-            return _kept(folder / f"{name}.json", family.document(folder, chosen, count, progress), began)
-    drives = _real_sets(data) if family.NEEDS == "data" else Cities(Path(city or folder / "city"), folder)
+            return _kept(folder / f"{name}.json", family.document(folder, chosen, used, progress), began)
+    drives = _real_sets(data) if family.NEEDS == "data" else _city(city, folder, data)
     cases = family.cases(drives, chosen)
+    for case in cases:
+        if case.train is not None:
+            require(case.scorer_part)  # before the city is made, which takes a quarter of an hour
     if city is not None or isinstance(drives, RealSets):
         drives.check(cases)
     with locked(folder / "reproduce"):
         if city is None and isinstance(drives, Cities):
-            generate(drives.city, workers=count, progress=_of_city(progress))
+            generate(drives.city, workers=used, progress=_of_city(progress))
         runs = Runs(folder, drives.source)
         cases = runs.distinct(cases)
-        _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, count, progress)
+        _answer([case for case in cases if not runs.done(case)], len(cases), drives, runs, used, progress)
         document: dict[str, Any] = family.collect(drives, runs, chosen)
         document |= {
             "settings": {"drives": drives.settings, "seeds": chosen.seeds, "train": chosen.train}
@@ -116,10 +120,8 @@ def _kept(file: Path, document: dict[str, Any], began: float) -> dict[str, Any]:
     return document
 
 
-def _check(name: str, family: ModuleType, choice: Choice, workers: int) -> None:
+def _check(name: str, family: ModuleType, choice: Choice) -> None:
     """SettingsError for a choice that this table cannot make."""
-    if workers < 1:
-        raise SettingsError(f"{workers} processes can do nothing: take at least 1")
     if choice.methods and not family.METHODS:
         raise SettingsError(f"{name} changes the paper's own methods: no others can stand in it")
     for one in choice.methods:
@@ -138,6 +140,11 @@ def _of_city(progress: Progress | None) -> Callable[[CityProgress], None] | None
     return lambda at: progress(round(at.share * 1000), 1000, f"driving {at.drive}")
 
 
+def _city(city: str | Path | None, folder: Path, data: str | Path | None) -> Panels:
+    """The city's drives, by default those in `folder`, and beside them real sets."""
+    return Panels(Path(city or folder / "city"), folder, None if data is None else Path(data))
+
+
 def _real_sets(data: str | Path | None) -> RealSets:
     """The sets in a folder of data; InputError where none is there."""
     if data is None:
@@ -149,7 +156,7 @@ def _real_sets(data: str | Path | None) -> RealSets:
 
 
 def _answer(
-    cases: list[Case], total: int, drives: Drives, runs: Runs, workers: int, progress: Progress | None
+    cases: list[Case], total: int, drives: Drives, runs: Runs, workers: Workers, progress: Progress | None
 ) -> None:
     """Run all `cases` in processes; those that share a map stand together."""
     if not cases:
@@ -161,7 +168,7 @@ def _answer(
     # What is trained comes first: the longest work last would leave a core idle. Each process gets its share
     # at once, for starting one takes seconds.
     ordered = sorted(groups.values(), key=lambda group: group[0].train is None)
-    count = min(workers, len(ordered))
+    count = min(workers.count, len(ordered))
     shares = [[sorted(group, key=_shared) for group in ordered[start::count]] for start in range(count)]
     jobs = [
         {
@@ -177,7 +184,7 @@ def _answer(
         if progress is not None:
             progress(finished[0], total, line)
 
-    run_all("evplace_lab.reproduction._worker", jobs, count, said)
+    run_all("evplace_lab.reproduction._worker", jobs, workers, runs.out, said)
 
 
 def _shared(case: Case) -> tuple[str, str, str]:

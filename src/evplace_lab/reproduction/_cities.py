@@ -10,8 +10,10 @@ import numpy as np
 
 from evplace.core.errors import InputError
 from evplace.core.events import Events
+from evplace.core.folders import instead
 from evplace.core.settings import make
 from evplace.core.storage import new_folder, read_json
+from evplace.core.workers import Workers
 from evplace.evaluation._evaluate import Rule, truth_of
 from evplace.evaluation.truth import Truth
 from evplace.imaging.images import Imager, ImageSettings
@@ -53,7 +55,10 @@ class Cities:
     def settings(self) -> dict[str, Any]:
         """How the benchmark's drives were made; InputError where there are none."""
         if not (self.city / SETTINGS_FILE).exists():
-            raise InputError(f"{self.city} holds no drives: make them with evplace city -o {self.city}")
+            raise InputError(
+                instead(self.city, SETTINGS_FILE)
+                or f"{self.city} holds no drives: make them with evplace city -o {self.city}"
+            )
         return read_json(self.city / SETTINGS_FILE, "the settings of a city")
 
     def opened(self, drive: str, case: Case) -> Traverse:
@@ -87,7 +92,7 @@ class Cities:
                         "a new folder: evplace city -o FOLDER"
                     )
 
-    def prepare(self, cases: list[Case], workers: int) -> None:
+    def prepare(self, cases: list[Case], workers: Workers) -> None:
         """Make the drives and images that the benchmark does not have and some case needs."""
         if any(case.exposure == "auto" for case in cases):
             exposed = self._like(sensors=(), most_gain=EXPOSED_GAIN, keep_events=False)

@@ -10,6 +10,7 @@ import numpy as np
 
 from evplace.core.errors import InputError
 from evplace.core.settings import to_dict
+from evplace.core.workers import Workers
 from evplace.drives.to_traverse import open_traverse
 from evplace.evaluation.truth import Truth, by_frames, by_matrix
 from evplace.imaging.traverse import Traverse
@@ -117,7 +118,7 @@ class RealSets:
             for rule, tolerance in zip(real.rules, real.tolerances, strict=True)
         }
 
-    def prepare(self, cases: list[Case], workers: int) -> None:
+    def prepare(self, cases: list[Case], workers: Workers) -> None:
         """Nothing: what is not there is not made."""
 
     def _files(self, real: RealSet) -> list[Path]:

@@ -69,6 +69,10 @@ class Runs:
         """Where the map of a case is kept."""
         return self.out / "maps" / f"{self.map_key(case)}.evp"
 
+    def checkpoint(self, case: Case) -> Path:
+        """Where a case that takes long keeps what it has so far."""
+        return self._file(case).with_suffix(".checkpoint")
+
     def result_folder(self, case: Case) -> Path:
         """Where the whole result of a case is kept."""
         return self.out / "results" / case.keep

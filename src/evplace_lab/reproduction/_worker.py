@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import MissingExtraError
+from evplace.core.tables import rows_of
 from evplace.core.workers import serve
 from evplace.evaluation import Result, sample
-from evplace.evaluation._evaluate import item_images, judged
+from evplace.evaluation._evaluate import Heard, hear, item_images, judged
 from evplace.evaluation.sweeps import sweep
 from evplace.evaluation.truth import Truth
 from evplace.imaging.traverse import Traverse
-from evplace.localizer import Answered, Answers, Localizer
+from evplace.localizer import Answers, Localizer
 from evplace.matchers import RouteMatcher
 from evplace.matchers.best import Best
 from evplace.matchers.local import Local
@@ -28,11 +29,11 @@ from evplace.placemap import PlaceMap, calibrate, train
 from evplace.scorers import Learning, Rows
 from evplace_lab.reproduction import Drives
 from evplace_lab.reproduction._cases import Case
-from evplace_lab.reproduction._cities import Cities
+from evplace_lab.reproduction._panels import Panels
 from evplace_lab.reproduction._real_sets import RealSets
 from evplace_lab.reproduction._runs import TIMINGS, Runs
 
-KINDS: dict[str, type[Cities] | type[RealSets]] = {kind.__name__: kind for kind in (Cities, RealSets)}
+KINDS: dict[str, type[Panels] | type[RealSets]] = {kind.__name__: kind for kind in (Panels, RealSets)}
 
 
 def work(job: dict[str, Any], say: Callable[[str], None]) -> None:
@@ -40,7 +41,10 @@ def work(job: dict[str, Any], say: Callable[[str], None]) -> None:
     drives = KINDS[job["kind"]].from_dict(job["drives"])
     runs = Runs(Path(job["out"]), drives.source)
     for group in job["groups"]:
-        _answer_group([Case.from_dict(values) for values in group], drives, runs, say)
+        cases = [Case.from_dict(values) for values in group]
+        todo = [case for case in cases if not runs.done(case)]  # a killed worker may have done some
+        if todo:
+            _answer_group(todo, drives, runs, say)
 
 
 def _answer_group(cases: list[Case], drives: Drives, runs: Runs, say: Callable[[str], None]) -> None:
@@ -104,18 +108,15 @@ def _answer(
     truths = drives.truths(place_map, query, case)
     found: dict[str, Any] = {}
     for timing in TIMINGS:
-        answered = where.answers(query, timing, rows.get(timing))
-        rows[timing] = answered.rows
-        found[timing] = _by_rules(case, where, query, answered, truths, timing)
+        heard = hear(
+            where, query, list(truths.values()), timing, rows.get(timing), case.swept or None,
+            checkpoint=runs.checkpoint(case),
+        )  # fmt: skip
+        if heard.rows is not None:  # in memory, or needed for a curve: they serve the next case
+            rows[timing] = heard.rows
+        found[timing] = _by_rules(case, where, query, heard, list(truths))
         if case.keep and timing == "live":
-            _keep(
-                case,
-                judged(where, query, answered, next(iter(truths.values())), timing),
-                place_map,
-                query,
-                day,
-                runs,
-            )
+            _keep(case, judged(where, query, heard, 0), place_map, query, day, runs)
     taken = {"cpu_s": round(time.process_time() - began, 2)}
     taken["train_cpu_s"] = place_map.info.get("train_cpu_s", 0.0)
     runs.keep(case, {**found, **taken})
@@ -132,20 +133,18 @@ def _keep(
 
 
 def _by_rules(
-    case: Case,
-    where: Localizer,
-    query: Traverse,
-    answered: Answered,
-    truths: dict[str, Truth],
-    timing: Answers,
+    case: Case, where: Localizer, query: Traverse, heard: Heard, rules: list[str]
 ) -> dict[str, Any]:
     """Rule -> figures, and by the first rule, which is the paper's, the curve where it is wanted."""
     found: dict[str, Any] = {}
-    for rule, truth in truths.items():
-        result = judged(where, query, answered, truth, timing)
+    for number, rule in enumerate(rules):
+        result = judged(where, query, heard, number)
         found[rule] = {"figures": result.figures}
-        if case.swept and len(found) == 1:
-            found[rule]["curve"] = _curve(where, answered.rows, query, result, truth.right, timing).tolist()
+        if case.swept and not number:
+            assert heard.rows is not None
+            found[rule]["curve"] = _curve(
+                where, heard.rows, query, result, heard.truths[0], heard.answers
+            ).tolist()
     return found
 
 
@@ -154,22 +153,20 @@ def _curve(
     rows: Rows,
     query: Traverse,
     result: Result,
-    right: NDArray[np.bool_],
+    truth: Truth,
     timing: Answers,
 ) -> NDArray[np.float64]:
-    """(values, 3) the swept parameter's value, recall (of the seen) and precision, in the order of recall.
-
-    `right` (queries, items) is the truth.
-    """
+    """(values, 3) the swept parameter's value, recall (of the seen) and precision, in the order of recall."""
     filled = np.flatnonzero(query.counts != 0)
-    values = _every_level(rows[filled]) if isinstance(where.matcher, Local) else None
-    points = []
-    swept = sweep(where.matcher, rows[filled], values, None, where.scorer.distances, timing)
-    for value, path in swept:
-        item = np.full(len(query), -1, np.int64)
-        item[filled] = np.where(path.accepted, path.item, -1)
-        accepted = (item >= 0)[result.judged]
-        hits = (accepted & right[np.arange(len(item)), item][result.judged]).sum()
+    shown, judged = rows_of(rows, filled), result.judged[filled]
+    values = _every_level(shown) if isinstance(where.matcher, Local) else None
+    points, item, right = [], np.full(len(query), -1, np.int64), np.zeros(len(query), np.bool_)
+    for value, path in sweep(where.matcher, shown, values, None, where.scorer.distances, timing):
+        if not np.array_equal(item[filled], path.item):  # one path may be judged at many values
+            item[filled] = path.item
+            right = truth.accepts(item)
+        accepted = (path.accepted & (path.item >= 0))[judged]
+        hits = (accepted & right[filled][judged]).sum()
         if accepted.any():
             seen = max(int(result.seen[result.judged].sum()), 1)
             points.append((value, hits / seen, hits / accepted.sum()))

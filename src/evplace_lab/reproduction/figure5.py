@@ -1,4 +1,7 @@
-"""The paper's Figure 5: precision against recall, day to night and day to rain, on events and on colour.
+"""The paper's Figure 5: precision against recall in four panels, on events and on colour.
+
+Two are of the city, day to night and day to rain. Oxford and the campus are real sets, drawn by their
+adapters where their data are there; else the panel says what it needs.
 
 Swept are tau1, mu and m, as in the paper (5.2), at every value that changes an answer. Recall is of the
 queries whose place the map has. tau1 touches only queries that fail the local test, so its curve need not
@@ -19,6 +22,7 @@ from numpy.typing import NDArray
 from evplace_lab.reproduction import Choice, Drives, Table
 from evplace_lab.reproduction._cases import Case
 from evplace_lab.reproduction._figures import deviation, label_of
+from evplace_lab.reproduction._panels import Panels
 from evplace_lab.reproduction._recipes import inputs, methods, recipes
 from evplace_lab.reproduction._runs import TIMINGS, Runs
 
@@ -47,17 +51,29 @@ class Recipe:
     """How places are found."""
     paper: tuple[Any, ...] = field(default=())
     """Curves of the paper: method, and points (recall, precision)."""
+    folder: str = ""
+    """Of a real set: its folder below that of the data; empty for the city's drives."""
+    dataset: str = ""
+    """Its name, as `evplace list datasets` has it."""
+    needs: str = ""
+    """What must lie there, for people."""
+    command: str = ""
+    """What draws the panel then."""
+
+    def drive(self, name: str) -> str:
+        """A drive's name as `Panels` takes it."""
+        return f"{self.folder}: {self.dataset}: {name}" if self.folder else name
 
 
-def cases(_: Drives, choice: Choice) -> list[Case]:
+def cases(drives: Drives, choice: Choice) -> list[Case]:
     """All curves, one a seed."""
-    return [case for _, _, _, group in _curves(choice) for case in group]
+    return [case for _, _, _, group in _curves(drives, choice) for case in group]
 
 
-def collect(_: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
-    """The curves of the first seed, with the average precision over all."""
+def collect(drives: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
+    """The curves of the first seed, with the average precision over all; and what lacks its data."""
     curves = []
-    for recipe, name, method, group in _curves(choice):
+    for recipe, name, method, group in _curves(drives, choice):
         outcomes = [runs.found(case) for case in group]
         about = {"panel": recipe.panel, "query": recipe.query, "input": name, "sensor": inputs()[name].sensor}
         about |= {"matcher": method, "parameter": group[0].matcher_part.sweep().parameter}
@@ -65,7 +81,12 @@ def collect(_: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
         found = [live] if live == {**late, "answers": "live"} else [live, late]
         curves += [{**about, **curve} for curve in found]
     paper = [{"panel": recipe.panel, **curve} for recipe in _chosen() for curve in recipe.paper]
-    return {"format": FORMAT, "title": TITLE, "curves": curves, "paper": paper}
+    lacking = [
+        {"panel": recipe.panel, "needs": recipe.needs, "command": recipe.command}
+        for recipe in _chosen()
+        if not _is_there(recipe, drives)
+    ]
+    return {"format": FORMAT, "title": TITLE, "curves": curves, "paper": paper, "lacking": lacking}
 
 
 def tables(document: dict[str, Any]) -> Iterator[Table]:
@@ -82,6 +103,17 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
             )
         columns = ["input", "method", "swept", "average precision", "from recall, precision", "to", "points"]
         yield Table(f"Precision against recall, {panel}", columns, lines)
+    if document["lacking"]:
+        lines = [[one["panel"], one["needs"], one["command"]] for one in document["lacking"]]
+        yield Table("Needs data", ["panel", "what", "then"], lines)
+
+
+def _is_there(recipe: Recipe, drives: Drives) -> bool:
+    """Whether a panel can be drawn: the city is made where it is lacking, a real set is not."""
+    if not recipe.folder:
+        return True
+    wanted = (recipe.database, recipe.query)
+    return isinstance(drives, Panels) and drives.has(recipe.folder, recipe.dataset, wanted)
 
 
 def average_precision(curve: NDArray[np.float64]) -> float:
@@ -101,15 +133,16 @@ def _curve_of(outcomes: list[dict[str, Any]], timing: str) -> dict[str, Any]:
     }
 
 
-def _curves(choice: Choice) -> Iterator[tuple[Recipe, str, str, list[Case]]]:
+def _curves(drives: Drives, choice: Choice) -> Iterator[tuple[Recipe, str, str, list[Case]]]:
     """Each panel, input and method with its cases: one a seed, or one where nothing is trained."""
-    for recipe in _chosen():
+    for recipe in (recipe for recipe in _chosen() if _is_there(recipe, drives)):
         for name in recipe.inputs:
             if choice.inputs and name not in choice.inputs:
                 continue
             for method in (*recipe.methods, *choice.methods):
                 how = (methods() | choice.methods)[method]
-                first = Case.of(recipe.database, recipe.query, inputs()[name], how, choice.train)
+                drives_of = (recipe.drive(recipe.database), recipe.drive(recipe.query))
+                first = Case.of(*drives_of, inputs()[name], how, choice.train)
                 yield (
                     recipe,
                     name,

@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
+from evplace.core.workers import Workers
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.matchers import _traces as traces
 from evplace.matchers._calibration import strangers
-from evplace.matchers._known import of_drive
+from evplace.matchers._known import of_late, of_live
 from evplace.matchers._ways import Ways
 from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
@@ -57,6 +58,8 @@ ASKED = 0.01
 """Share of false accepts for which the thresholds are."""
 RIDGE = 1e-3
 """Penalty on large weights."""
+LIVE_COUNTS = 0.5
+"""What the log-odds of a live answer count beside those of the late one."""
 NEAR_M, SAME_WAY_DEG = 20.0, 34.0
 """An answer so near that looks the same way is right."""
 Floats = NDArray[np.float64]
@@ -95,7 +98,7 @@ class Own:
 
 
 def document(
-    out: Path, choice: Choice, workers: int, progress: Callable[[int, int, str], None] | None
+    out: Path, choice: Choice, workers: Workers, progress: Callable[[int, int, str], None] | None
 ) -> dict[str, Any]:
     """Make the drives that are missing, fit, and judge; SettingsError for settings of a training."""
     if choice.train:
@@ -213,7 +216,10 @@ def _answers(
     }
     known = np.asarray(right.any(axis=1), np.bool_)
     return Answers(
-        {kind: of_drive(one.signs, one.weight, kind == "late") for kind, one in found.items()},
+        {
+            "live": of_live(found["live"].signs, found["live"].weight),
+            "late": of_late(found["late"].signs, found["late"].live, found["late"].weight),
+        },
         {kind: right[np.arange(len(right)), one.item] for kind, one in found.items()},
         known,
     )
@@ -229,9 +235,24 @@ def _right(query: Traverse, position: Floats, heading_deg: Floats) -> Bools:
 
 
 def _fitted(drives: list[Drive], kind: str) -> Floats:
-    """The weights of 1 and of the features: a logistic regression with a ridge, by Newton's method."""
-    features = np.concatenate([drive.answers.features[kind] for drive in drives])
+    """The weights of 1 and of the features.
+
+    Of late answers those of both sides are fitted by themselves; then the log-odds of live ones are added by
+    LIVE_COUNTS, and the sum scaled anew.
+    """
     right = np.concatenate([drive.answers.right[kind] for drive in drives]).astype(np.float64)
+    features = np.concatenate([drive.answers.features[kind] for drive in drives])
+    if kind == "live":
+        return _regression(features, right)
+    sides = len(features[0]) - len(drives[0].answers.features["live"][0])
+    own, live = _regression(features[:, :sides], right), _fitted(drives, "live")
+    weights = np.concatenate([[own[0] + LIVE_COUNTS * live[0]], own[1:], LIVE_COUNTS * live[1:]])
+    shift, scale = _regression((weights[0] + features @ weights[1:])[:, None], right)
+    return np.asarray(scale * weights + shift * np.eye(len(weights))[0], np.float64)
+
+
+def _regression(features: Floats, right: Floats) -> Floats:
+    """The weights of 1 and of the features: a logistic regression with a ridge, by Newton's method."""
     middle, scale = features.mean(axis=0), features.std(axis=0) + 1e-9
     table = np.column_stack([np.ones(len(features)), (features - middle) / scale])
     weights = np.zeros(table.shape[1])

@@ -15,6 +15,8 @@ from evplace.core.errors import OutputError, SettingsError
 from evplace.core.events import Events
 from evplace.core.settings import to_dict
 from evplace.core.workers import start
+from evplace.drives import datasets
+from evplace.drives.to_traverse import open_traverse
 from evplace.imaging.traverse import Traverse
 from evplace.sources.readers import open_recording
 from evplace_lab.city import CitySettings, Film, Progress, build_town, generate, moving_preview, preview
@@ -143,8 +145,19 @@ def test_events_are_kept_on_request(tmp_path: Path) -> None:
         inside = (events.t_us > t_us - SMALL.window_us) & (events.t_us <= t_us)
         assert inside.sum() == count
     assert sorted(path.name for path in folder.iterdir()) == [
-        "colour", "from-8bit", "from-8bit.aedat4", "ideal", "ideal.aedat4", "poses.npy",
+        "colour", "from-8bit", "from-8bit.aedat4", "from-8bit.csv", "from-8bit.nmea", "ideal", "ideal.aedat4",
+        "ideal.csv", "ideal.nmea", "poses.npy",
     ]  # fmt: skip
+    wanted = traverse.track
+    assert wanted is not None
+    for log in ("ideal.nmea", "ideal.csv"):
+        found = open_traverse(folder / "ideal.aedat4", track=folder / log).track
+        assert found is not None
+        assert (found.zone, found.northern) == (wanted.zone, wanted.northern)
+        at = np.array([np.interp(found.t_us, wanted.t_us, column) for column in wanted.xy.T]).T
+        away = np.hypot(*(found.xy - at).T)
+        assert np.nanmax(away) < 0.1
+    assert "ideal" in datasets.drives(folder)
 
 
 CHECKS = {

@@ -13,7 +13,7 @@ torch = pytest.importorskip("torch", reason="the network needs the extra 'train'
 from evplace.scorers import Learning  # noqa: E402
 from evplace.scorers._network import checkpoint  # noqa: E402
 from evplace_lab.descriptor.augmentation import NOISE, _noise, augmented  # noqa: E402
-from evplace_lab.descriptor.batches import Batch, draw_batch  # noqa: E402
+from evplace_lab.descriptor.batches import Batch, Routes, draw_batch  # noqa: E402
 from evplace_lab.descriptor.bursts import Bursts  # noqa: E402
 from evplace_lab.descriptor.training import (  # noqa: E402
     TrainingSettings,
@@ -40,14 +40,15 @@ def towns() -> list[Bursts]:
 
 
 def test_a_batch_depends_on_seed_and_step_alone(towns: list[Bursts]) -> None:
-    one, again = (draw_batch(towns, 5, 7, 2, 3) for _ in range(2))
+    routes = Routes.of(towns, "cpu")
+    one, again = (draw_batch(routes, 5, 7, 2, 3) for _ in range(2))
     np.testing.assert_array_equal(one.images, again.images)
-    assert not np.array_equal(one.images, draw_batch(towns, 5, 8, 2, 3).images)
-    assert not np.array_equal(one.images, draw_batch(towns, 6, 7, 2, 3).images)
+    assert not np.array_equal(one.images, draw_batch(routes, 5, 8, 2, 3).images)
+    assert not np.array_equal(one.images, draw_batch(routes, 6, 7, 2, 3).images)
 
 
 def test_a_batch_has_each_place_in_every_drive(towns: list[Bursts]) -> None:
-    batch = draw_batch(towns, 0, 0, 2, 3)
+    batch = draw_batch(Routes.of(towns, "cpu"), 0, 0, 2, 3)
     assert batch.images.shape == (2 * 3 * 3, 45, 80)
     assert batch.route.tolist() == [0] * 9 + [1] * 9
 
@@ -71,9 +72,9 @@ def test_augmented_images_are_others_in_the_same_range() -> None:
 
 
 def loss(vectors: list[list[float]], x: list[float], route: list[int]) -> float:
-    poses = np.zeros((len(x), 3), np.float32)
-    poses[:, 0] = x
-    batch = Batch(np.zeros((len(x), 45, 80), np.float32), poses, np.array(route, np.int64))
+    poses = torch.zeros(len(x), 3)
+    poses[:, 0] = torch.tensor(x)
+    batch = Batch(torch.zeros(len(x), 45, 80), poses, torch.tensor(route))
     return float(info_nce(torch.tensor(vectors), batch))
 
 

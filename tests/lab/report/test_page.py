@@ -121,7 +121,7 @@ def test_only_event_images_become_ink_on_paper(kind: str, turned: bool) -> None:
     result = make_result()
     assert result.samples is not None
     dark = dataclasses.replace(result.samples, images=np.zeros_like(result.samples.images))
-    shaded = dataclasses.replace(result, settings={"map": {"input": kind}}, samples=dark)
+    shaded = dataclasses.replace(result, settings={"map": {"recipe": {"kind": kind}}}, samples=dark)
     ((_, sources), *_) = sample_images({"r": shaded})["r"]
     picture = Image.open(io.BytesIO(base64.b64decode(sources[0].partition(",")[2])))
     assert np.asarray(picture.convert("L"))[0, 0] == (255 if turned else 0)

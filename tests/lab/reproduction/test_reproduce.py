@@ -187,6 +187,7 @@ def test_a_network_is_trained_as_the_paper_says_or_by_the_methods_preset_and_set
 def test_figure_5_has_a_curve_for_each_method(table: dict[str, Any], city: Path, out: Path) -> None:
     maps = {file: file.stat().st_mtime_ns for file in (out / "maps").iterdir()}
     figure = reproduce("figure5", out, city, choice=Choice(2, TRAINING, ("events",)), workers=1)
+    assert [one["panel"] for one in figure["lacking"]] == ["Oxford RobotCar", "campus"]
     assert {file: file.stat().st_mtime_ns for file in (out / "maps").iterdir()} == maps
     assert [c["panel"] for c in figure["curves"] if c["answers"] == "live"].count("day-night") == 7
     for curve in figure["curves"]:

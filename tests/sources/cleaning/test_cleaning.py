@@ -142,8 +142,8 @@ def strengths_twin(events: Events, frequency: int, region: int, window_us: int) 
     beside = 2_000_000 // window_us
     agreement = []
     for tooth in (frequency, frequency - beside, frequency + beside):
-        phase = since * tooth * 256 // 1_000_000 % 256
-        z = sign * np.exp(2j * np.pi * phase / 256)
+        z = np.exp(2j * np.pi * (since // 4 * 4 * tooth) / 1e6)
+        z = sign * (np.rint(127 * z.real) + 1j * np.rint(127 * z.imag)) / 127
         power, pairs = np.zeros(place.max() + 1), np.zeros(place.max() + 1)
         for w in range(window.max()):
             here = window == w

@@ -15,8 +15,14 @@ from evplace.sources.cleaning._pixels import Counts, Mask, check_size, only
 MAINS_HZ = (50, 60, 100, 120, 200, 240)
 """Where lamps flicker: mains of 50 and 60 Hz, twice that, and one harmonic."""
 
-_PHASES = 256
-"""Steps of a full turn in the flicker meter's table: 8 bits."""
+_STEP_US = 4
+"""Time from one row of the flicker meter's table to the next: a thousandth of the shortest period."""
+_HIGH = 127
+"""The waves' height in that table, whose numbers have 8 bits."""
+_SUMMED = 256
+"""Events of a region whose waves are summed in 16 bits."""
+_LANES = 32
+"""The table's columns are a multiple of this, so that they are summed many at once."""
 
 _MIN_PAIRS = 1000
 """Below this the flicker of a region is not known: chance alone gives 1 / sqrt(pairs)."""
@@ -46,19 +52,19 @@ class FlickerMeter:
                 f"are impossible: frequencies are whole numbers above {beside} Hz for such a window"
             )
         self.size, self.region, self.window_us = size, region, window_us
-        teeth = [tooth for f in frequencies_hz for tooth in (f, f - beside, f + beside)]
-        self._turns = np.array([-(-(tooth << 64) // 1_000_000) for tooth in teeth], np.uint64)
+        self._waves = _waves(
+            [tooth for f in frequencies_hz for tooth in (f, f - beside, f + beside)], window_us
+        )
         self._grid = (-(-size[1] // region), -(-size[0] // region))
-        regions = self._grid[0] * self._grid[1]
+        regions, teeth = self._grid[0] * self._grid[1], 3 * len(frequencies_hz)
         self._row = np.arange(size[1]) // region * self._grid[1]
         self._column = np.arange(size[0]) // region
-        self._sums = np.zeros((regions, 2, len(teeth)))
+        self._sums = np.zeros((regions, self._waves.shape[1]), np.int16)
+        self._totals = np.zeros((regions, self._waves.shape[1]), np.int64)
         self._events = np.zeros(regions, np.int64)
-        self._power = np.zeros((regions, len(teeth)))
+        self._power = np.zeros((regions, teeth))
         self._pairs = np.zeros(regions)
         self._start_us = np.full(1, np.iinfo(np.int64).min)
-        turn = np.arange(_PHASES) * (2 * np.pi / _PHASES)
-        self._table = np.stack([np.cos(turn), np.sin(turn)])
 
     def push(self, events: Events) -> None:
         """Take the next packet."""
@@ -66,8 +72,8 @@ class FlickerMeter:
         if len(events) and self._start_us[0] == np.iinfo(np.int64).min:
             self._start_us[0] = events.t_us[0]
         _beat(
-            events.t_us, events.x, events.y, events.p, self._row, self._column, self.window_us,
-            self._turns, self._table, self._start_us, self._sums, self._events, self._power, self._pairs,
+            events.t_us, events.x, events.y, events.p, self._row, self._column, self.window_us, self._waves,
+            self._start_us, self._sums, self._totals, self._events, self._power, self._pairs,
         )  # fmt: skip
 
     def pairs(self) -> NDArray[np.float64]:
@@ -126,6 +132,15 @@ class FlickerFilter:
         return only(events, keep)
 
 
+def _waves(teeth: Sequence[int], window_us: int) -> NDArray[np.int8]:
+    """(steps of a window, columns) cosines of all teeth, then sines, then nothing."""
+    turns = np.outer(np.arange(0, window_us, _STEP_US), teeth) / 1e6 % 1
+    waves = np.zeros((len(turns), -(-2 * len(teeth) // _LANES) * _LANES), np.int8)
+    waves[:, : len(teeth)] = np.rint(_HIGH * np.cos(2 * np.pi * turns))
+    waves[:, len(teeth) : 2 * len(teeth)] = np.rint(_HIGH * np.sin(2 * np.pi * turns))
+    return waves
+
+
 @njit(cache=True)
 def _beat(
     t_us: NDArray[np.int64],
@@ -135,38 +150,50 @@ def _beat(
     row: Counts,
     column: Counts,
     window_us: int,
-    turns: NDArray[np.uint64],
-    table: NDArray[np.float64],
+    waves: NDArray[np.int8],
     start_us: Counts,
-    sums: NDArray[np.float64],
+    sums: NDArray[np.int16],
+    totals: Counts,
     events: Counts,
     power: NDArray[np.float64],
     pairs: NDArray[np.float64],
 ) -> None:
-    """Sum signed phases in the window from start_us[0]; a complete window goes to power and pairs.
+    """Sum signed waves in the window from start_us[0]; a complete window goes to power and pairs.
 
-    `turns` are turns a microsecond, in 64 bits behind the point: products keep their fraction alone, and its
-    8 highest bits are the step of the table. `row` + `column` is the region.
+    `row` + `column` is the region. Sums are whole numbers; before one can pass 16 bits, it goes to `totals`.
     """
+    columns = np.uint64(
+        waves.shape[1]
+    )  # unsigned, so that an index needs no look whether it counts from the end
     for i in range(len(t_us)):
         if t_us[i] - start_us[0] >= window_us:
-            for place in range(len(events)):
-                n = events[place]
-                pairs[place] += n * (n - 1.0)
-                for k in range(len(turns)):
-                    power[place, k] += sums[place, 0, k] ** 2 + sums[place, 1, k] ** 2 - n
-            sums[:] = 0.0
+            for each in range(len(events)):
+                _close(sums[each], totals[each], events[each], power[each])
+                pairs[each] += events[each] * (events[each] - 1.0)
             events[:] = 0
             start_us[0] += (t_us[i] - start_us[0]) // window_us * window_us
-        place = row[y[i]] + column[x[i]]
+        place = np.uint64(row[y[i]] + column[x[i]])
+        step = np.uint64((t_us[i] - start_us[0]) // _STEP_US)
+        sign = np.int16(1 if p[i] else -1)
+        for k in range(columns):
+            sums[place, k] += sign * np.int16(waves[step, k])
         events[place] += 1
-        sign = 1.0 if p[i] else -1.0
-        since = np.uint64(t_us[i] - start_us[0])
-        real, imaginary = sums[place, 0], sums[place, 1]
-        for k in range(len(turns)):
-            phase = (since * turns[k]) >> np.uint64(56)
-            real[k] += sign * table[0, phase]
-            imaginary[k] += sign * table[1, phase]
+        if events[place] % _SUMMED == 0:
+            for k in range(columns):
+                totals[place, k] += sums[place, k]
+                sums[place, k] = 0
+
+
+@njit(cache=True)
+def _close(sums: NDArray[np.int16], totals: Counts, events: int, power: NDArray[np.float64]) -> None:
+    """What a region's window adds to its power, without what single events give; its sums begin anew."""
+    teeth = len(power)
+    for k in range(2 * teeth):
+        totals[k] += sums[k]
+    for k in range(teeth):
+        power[k] += (float(totals[k]) ** 2 + float(totals[teeth + k]) ** 2) / _HIGH**2 - events
+    totals[:] = 0
+    sums[:] = 0
 
 
 @njit(cache=True)

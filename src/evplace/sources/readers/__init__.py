@@ -9,7 +9,8 @@ To add a format, add one file and its test. The file holds:
   None), the guesses made (`notes`), the names of the streams of events in it (the one that is read first; see
   `ordered`), and `blocks()`, which starts at the beginning and gives the decoded events in bounded memory.
   `read` raises RecordingError where the header cannot be used, UnsupportedError where it names what is not
-  read, `blocks()` raises DamagedRecordingError where the data breaks off, after every good block;
+  read, `blocks()` raises DamagedRecordingError where the data breaks off, after every good block; of a large
+  file it is called, and its blocks are made, in a thread of their own;
 - `TABLE = True` where events stand in columns, so that `hints.columns` has a meaning.
 
 The reader only decodes. `Recording` checks coordinates and times, counts what it drops, infers a missing
@@ -27,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 from evplace.core import families
 from evplace.core.errors import EvplaceError, RecordingError, UnsupportedError
 from evplace.core.events import Size
+from evplace.core.folders import instead
 from evplace.core.storage import is_stream
 from evplace.sources.readers._foreign import foreign
 from evplace.sources.readers._source import Block, Hints, Source, checked_source
@@ -144,6 +146,8 @@ def _found(path: Path, head: bytes, table: bool = False) -> str:
         return "text"
     if (what := foreign(path, head)) is not None:
         raise UnsupportedError(f"{path} is {what}")
+    if (told := instead(path)) is not None:
+        raise RecordingError(told)
     known, what = ", ".join(families.names("readers")), "the folder" if path.is_dir() else "the content"
     raise RecordingError(
         f"{path}: {what} is of no known recording format: known are {known}{families.besides(faults)}"

@@ -174,7 +174,7 @@ def _goes_on(tally: NDArray[np.int64], t_us: int) -> bool:
     return True
 
 
-@njit(**UNCOUNTED)
+@njit(cache=True, **UNCOUNTED)
 def _close(tally: NDArray[np.int64]) -> None:
     """No time equals, or goes on from, that of a closed canvas."""
     if tally[UNTIL] != CLOSED:

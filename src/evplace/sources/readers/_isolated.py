@@ -37,7 +37,11 @@ def isolated(reader: str, path: Path, hints: Hints) -> Source:
     about = next(_Child(reader, path, hints, header_only=True).messages())
     assert isinstance(about, dict)
     return Source(
-        _pair(about["size"]), partial(_blocks, reader, path, hints), about["notes"], streams=about["streams"]
+        _pair(about["size"]),
+        partial(_blocks, reader, path, hints),
+        about["notes"],
+        streams=about["streams"],
+        apart=True,
     )
 
 

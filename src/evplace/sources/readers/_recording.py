@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.ahead import ahead
 from evplace.core.errors import (
     DamagedRecordingError,
     DoubtfulRecordingError,
@@ -27,6 +28,8 @@ USUAL_SIZES = (
     (1280, 720),
 )  # fmt: skip
 """Sensors that are sold or were; the smallest that holds the data is taken where a file states no size."""
+LARGE = 1 << 22
+"""Bytes of a file from which it is worth a thread."""
 NOWHERE = 0xFFFF
 """Stands for a coordinate that is no number: it says nothing of the sensor."""
 SAMPLE = 4_000_000
@@ -95,13 +98,22 @@ class Recording:
     def _blocks(self, canvas: Canvas | None) -> Iterator[Block]:
         """Decoded blocks; what was marked before the events of each is counted."""
         if canvas is None or self._source.onto is None:
-            yield from self._source.blocks()
+            yield from ahead(self._source.blocks) if self._is_large else self._source.blocks()
             return
         canvas.close()
         for block in self._source.onto(canvas):
             if block.marked:
                 self.events, self.t_last_us = (self.events or 0) + block.marked, canvas.last_us
             yield block
+
+    @property
+    def _is_large(self) -> bool:
+        """Whether it is decoded ahead; marking on a canvas goes hand in hand with the canvas's windows."""
+        try:
+            size = LARGE if self.path.is_dir() else self.path.stat().st_size
+        except OSError:  # it comes from elsewhere, or has gone: its blocks will say so
+            return False
+        return not self._source.apart and size >= LARGE
 
     def _judge(self, fault: RecordingError | None) -> None:
         """Raise what ended the reading, else what speaks against it."""

@@ -69,6 +69,8 @@ class Source:
     but one, without a name."""
     onto: Callable[[Canvas], Iterator[Block]] | None = None
     """As `blocks`, for a reader that can mark events on a canvas in place of storing them."""
+    apart: bool = False
+    """Whether another process decodes; else blocks of a large file are decoded in a thread of their own."""
 
 
 def ordered(path: Path, streams: Sequence[str], wanted: str | None) -> list[str]:

@@ -29,7 +29,7 @@ _DEGREES = re.compile(
 )
 """Degrees, minutes and seconds with something between them, and the side of the equator or of Greenwich."""
 _OTHER_NAMES = {
-    "timestamp": ("time", "t", "stamp", "utc", "datetime", "date_time", "unixtime", "gps_time"),
+    "timestamp": ("time", "t", "stamp", "utc", "datetime", "date_time", "unixtime", "gps_time", "t_us"),
     "latitude": ("lat",),
     "longitude": ("lon", "lng", "long"),
     "speed": ("speed_mps", "velocity"),
