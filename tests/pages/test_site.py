@@ -81,8 +81,12 @@ def test_every_extra_is_told() -> None:
     assert not [extra for extra in extras if f"`{extra}`" not in text]
 
 
-def test_the_citation_is_of_this_version() -> None:
-    assert f"version: {evplace.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+def test_the_version_is_the_same_everywhere() -> None:
+    version = evplace.__version__
+    assert f'\nversion = "{version}"\n' in (ROOT / "pyproject.toml").read_text()
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f'\n  version: "{version}"\n' in (ROOT / "packaging" / "conda" / "recipe.yaml").read_text()
+    assert f"\n## {version}" in (ROOT / "CHANGELOG.md").read_text()
 
 
 def own(family: str) -> list[str]:
