@@ -1,3 +1,4 @@
+# Not yet built: written where no Docker was at hand; its pip line is what `scripts/release` tries without extras.
 # evplace on a CPU, without torch:  docker build -t evplace .
 #   docker run --rm -v "$PWD:/data" evplace demo --quick
 #   docker run --rm -v "$PWD:/data" -p 8000:8000 -e EVPLACE_TOKEN evplace serve --map campus.evp --source night.aedat4 --host 0.0.0.0

@@ -1,10 +1,20 @@
-"""Loops that numba compiles. It is imported with the first call: who calls none does not wait for it."""
+"""Loops that numba compiles. Their machine code is kept and, where that can be, called without numba."""
 
 from __future__ import annotations
 
 import functools
+import os
+import threading
 from collections.abc import Callable
 from typing import Any
+
+from evplace.core import _machine_code
+from evplace.core._machine_code import Entry, Kinds, UnfitError, flattened
+
+SEEN_AT_WORK = any(name.startswith("NUMBA_") and name != "NUMBA_CACHE_DIR" for name in os.environ)
+"""Whoever sets numba's variables wants to see numba itself at work."""
+COMPILING = threading.RLock()
+"""Held by the one thread that makes or loads machine code."""
 
 
 def njit(before: Callable[[], None] | None = None, **options: Any) -> Any:
@@ -21,24 +31,49 @@ class _Compiled:
     def __init__(
         self, loop: Callable[..., Any], options: dict[str, Any], before: Callable[[], None] | None
     ) -> None:
-        self._loop, self._options, self._before = loop, options, before
+        self.loop, self.options, self._before = loop, options, before
+        self._entries: dict[Kinds, Entry | None] = {}
+        self._kept = bool(options.get("cache")) and not SEEN_AT_WORK
         functools.update_wrapper(self, loop)
 
     def __call__(self, *arguments: Any) -> Any:
+        if self._kept:
+            try:
+                kinds, values = flattened(arguments)
+            except UnfitError:
+                return self.dispatcher(*arguments)
+            if (entry := self._entry(kinds)) is not None:
+                return entry(values)
         return self.dispatcher(*arguments)
+
+    def _entry(self, kinds: Kinds) -> Entry | None:
+        """Its machine code for arguments of these kinds; None where numba itself must call it."""
+        if kinds not in self._entries:
+            with COMPILING:
+                self._entries[kinds] = _machine_code.entry_of(self, kinds)
+        return self._entries[kinds]
 
     @functools.cached_property
     def dispatcher(self) -> Any:
         """What numba makes of it."""
+        return self._made(self.options)
+
+    @functools.cached_property
+    def alone(self) -> Any:
+        """The same as part of machine code that needs nothing of numba."""
+        without = {name: value for name, value in self.options.items() if name != "cache"}
+        return self._made(without | _machine_code.ALONE)
+
+    def _made(self, options: dict[str, Any]) -> Any:
         import numba
 
         if self._before is not None:
             self._before()
-        return numba.njit(**self._options)(self._loop)
+        return numba.njit(**options)(self.loop)
 
     @property
     def _numba_type_(self) -> Any:
         """Numba asks for this where one loop calls another."""
         import numba
 
-        return numba.typeof(self.dispatcher)
+        return numba.typeof(self.alone if _machine_code.compiles() else self.dispatcher)
