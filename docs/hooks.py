@@ -18,6 +18,8 @@ DOCS = Path(__file__).parent
 SRC = DOCS.parent / "src"
 COMMANDS = "<!-- the commands -->"
 """Where a page shows them."""
+REMARK = re.compile(r"(\S.*?\S) {2,}(\S.*)")
+"""A command, and what is said of it beside it."""
 SHIM = re.compile(r'<script src="?https://unpkg.com/iframe-worker/shim"?></script>')
 """What the theme asks of another machine, so that the search works from a folder."""
 
@@ -71,5 +73,5 @@ def _command(file: Path) -> str:
     """A heading, the summary, the examples as they stand, and what the docstring says after them."""
     summary, _, rest = (ast.get_docstring(ast.parse(file.read_text("utf-8"))) or "").partition("\n\n")
     examples, _, more = rest.removeprefix("Examples:\n").partition("\n\n")
-    lines = "\n".join(line.removeprefix("  ") for line in examples.splitlines())
+    lines = "\n".join(REMARK.sub(r"# \2\n\1", line.removeprefix("  ")) for line in examples.splitlines())
     return f"## evplace {file.stem}\n\n{summary}\n\n```sh\n{lines}\n```\n\n{more}\n"

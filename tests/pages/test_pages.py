@@ -22,6 +22,7 @@ ONLY_READ = {
     "evplace city": "drives for minutes",
     "evplace bench": "needs that city",
     "evplace demo": "drives for minutes",
+    "evplace sample": "drives for a minute",
     "evplace reproduce": "trains for an hour",
     "evplace report out": "shows what that has made",
     "evplace images /shared/": "needs a cluster",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -61,7 +62,7 @@ def test_figures_are_those_of_the_tables(page: str) -> None:
         assert f"| {query} | live | {figures} |" in table
 
 
-@pytest.mark.parametrize("family", ["readers", "writers", "tracks", "live", "datasets"])
+@pytest.mark.parametrize("family", ["readers", "writers", "tracks", "live", "datasets", "exports"])
 def test_every_format_is_named(family: str) -> None:
     text = (DOCS / "formats.md").read_text()
     assert not [name for name in own(family) if f"`{name}`" not in text]
@@ -74,8 +75,18 @@ def test_every_part_is_in_the_reference(family: str) -> None:
     assert not [name for name in own(family) if not re.search(rf"::: evplace\.{package}\.{name}\b", text)]
 
 
-def test_the_citation_is_of_this_version() -> None:
-    assert f"version: {evplace.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+def test_every_extra_is_told() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    text = (DOCS / "start.md").read_text()
+    assert not [extra for extra in extras if f"`{extra}`" not in text]
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    version = evplace.__version__
+    assert f'\nversion = "{version}"\n' in (ROOT / "pyproject.toml").read_text()
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f'\n  version: "{version}"\n' in (ROOT / "packaging" / "conda" / "recipe.yaml").read_text()
+    assert f"\n## {version}" in (ROOT / "CHANGELOG.md").read_text()
 
 
 def own(family: str) -> list[str]:
