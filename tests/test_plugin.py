@@ -146,10 +146,10 @@ def test_a_recipe_reproduces_with_them(site: Path, tmp_path: Path) -> None:
     code = f"""
 import json
 from pathlib import Path
-from evplace.core.workers import run_all
+from evplace.core.workers import Here, run_all
 from evplace_lab.city import CitySettings, generate
 from evplace_lab.reproduction._cases import Case, Method
-from evplace_lab.reproduction._cities import Cities
+from evplace_lab.reproduction._panels import Panels
 from evplace_lab.reproduction._recipes import inputs
 from evplace_lab.reproduction._runs import Runs
 
@@ -157,11 +157,11 @@ folder = Path({str(tmp_path)!r})
 generate(folder / "city", CitySettings(fps=10, route_length_m=60.0), workers=1)
 method = Method("thumbnail", "majority", "strict", {{"n": 3}}, {{"width": 20}})
 case = Case.of("day-1", "night-1", inputs()["events"], method)
-drives = Cities(folder / "city", folder)
-drives.prepare([case], 1)
+drives = Panels(folder / "city", folder)
+drives.prepare([case], Here(1))
 runs = Runs(folder, drives.source)
-job = {{"kind": "Cities", "drives": drives.to_dict(), "out": str(folder), "groups": [[case.to_dict()]]}}
-run_all("evplace_lab.reproduction._worker", [job], 1, lambda _, line: None)
+job = {{"kind": "Panels", "drives": drives.to_dict(), "out": str(folder), "groups": [[case.to_dict()]]}}
+run_all("evplace_lab.reproduction._worker", [job], Here(1), folder, lambda _, line: None)
 print(json.dumps([case.to_dict(), runs.found(case)]))
 """
     case, found = json.loads(ran(site, "-c", code))

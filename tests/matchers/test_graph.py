@@ -140,6 +140,22 @@ def test_memory_does_not_grow_with_the_queries_but_for_the_nodes_seen() -> None:
     assert len(graph._nodes) < 50 * 400
 
 
+def test_rows_that_are_still_to_come_hold_no_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Memory that is not yet written holds anything, and nodes are looked up by what rows hold."""
+    real = np.empty
+
+    def used(*size: object, **kind: object) -> np.ndarray:
+        memory = real(*size, **kind)
+        memory.view(np.uint8)[...] = 1
+        return memory
+
+    monkeypatch.setattr(np, "empty", used)
+    graph = open_matcher("graph", memory=50)
+    for row in np.random.default_rng(0).uniform(0.1, 1, (5, 30)):
+        graph.step(row)
+    assert not graph._grid[5:].any()
+
+
 def test_similarities_of_0_or_less_never_match() -> None:
     similarities = np.array([[0.9, -1.0, 0.0], [0.0, -0.5, 1e-12], [-0.9, 0.8, 0.0]])
     graph = open_matcher("graph")

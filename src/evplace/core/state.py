@@ -10,6 +10,7 @@ import importlib
 import io
 import json
 import zipfile
+import zlib
 from array import array
 from collections import deque
 from collections.abc import Callable, Collection
@@ -19,6 +20,11 @@ import numpy as np
 
 TEXT = "state"
 """The array that holds the text, as bytes."""
+DAMAGED = (
+    ValueError, LookupError, TypeError, AttributeError, EOFError, OSError, ImportError, RuntimeError,
+    zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What a file that is no state may raise: numpy, zipfile (of encryption, say) and the text's own nonsense."""
 PLAIN = (type(None), bool, int, float, str)
 
 
@@ -38,9 +44,7 @@ def unpacked(data: bytes, packages: Collection[str]) -> Any:
         with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
             about = json.loads(arrays[TEXT].tobytes())
             return _Unpacking(about["nodes"], dict(arrays), packages).value(about["top"])
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError, EOFError, OSError) as error:
-        raise ValueError(f"this is no state: {error}") from error
-    except (zipfile.BadZipFile, ImportError, RecursionError) as error:
+    except DAMAGED as error:
         raise ValueError(f"this is no state: {error}") from error
 
 

@@ -143,7 +143,7 @@ class _LazySearch:
         wanted = self._memory or queries + len(rows)
         if queries == 0 or wanted > len(self._scores):
             length = wanted if queries == 0 else max(wanted, 2 * len(self._scores))
-            scores, grid = np.empty((length, items), rows.dtype), np.empty((length, items), np.int32)
+            scores, grid = np.empty((length, items), rows.dtype), np.zeros((length, items), np.int32)
             if queries:
                 scores[:queries], grid[:queries] = self._scores[:queries], self._grid[:queries]
             self._scores, self._grid = scores, grid

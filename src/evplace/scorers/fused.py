@@ -114,6 +114,7 @@ class Fused:
         references = references_of(content)
         items, used = len(references), parts or self.parts
         _check_versions(content, _versions(self))
+        used = parts or self.parts
         opened: IndexedRows | _FusedRows = (
             IndexedRows(used, WEIGHTS, content, items)
             if ABOUT in content

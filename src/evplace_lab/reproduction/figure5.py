@@ -31,8 +31,6 @@ NEEDS = "city"
 INPUTS = ("events", "events, from 8 bit", "colour")
 METHODS = tuple(methods())
 FORMAT = "evplace-curves-1"
-COMMAND = "evplace reproduce figure5 --data DATA -o OUT"
-"""What draws the panels of real sets once these lie in DATA."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +57,8 @@ class Recipe:
     """Its name, as `evplace list datasets` has it."""
     needs: str = ""
     """What must lie there, for people."""
+    command: str = ""
+    """What draws the panel then."""
 
     def drive(self, name: str) -> str:
         """A drive's name as `Panels` takes it."""
@@ -82,7 +82,7 @@ def collect(drives: Drives, runs: Runs, choice: Choice) -> dict[str, Any]:
         curves += [{**about, **curve} for curve in found]
     paper = [{"panel": recipe.panel, **curve} for recipe in _chosen() for curve in recipe.paper]
     lacking = [
-        {"panel": recipe.panel, "needs": recipe.needs, "command": COMMAND}
+        {"panel": recipe.panel, "needs": recipe.needs, "command": recipe.command}
         for recipe in _chosen()
         if not _is_there(recipe, drives)
     ]

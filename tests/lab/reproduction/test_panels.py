@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from conftest import make_drive, write_drive
+from evplace.core.workers import workers_of
 from evplace.placemap import train
 from evplace_lab.report._found import Found, Sheet
 from evplace_lab.report._tables import lacking
@@ -41,9 +42,9 @@ def test_a_set_that_is_there_is_looked_for_and_one_that_is_not_says_what_it_need
 def test_its_drives_are_made_once_by_their_adapter(panels: Panels) -> None:
     case = next(case for case in of_real_sets(panels) if case.scorer == "ncc")
     panels = Panels.from_dict(panels.to_dict())
-    panels.prepare([case], 1)
+    panels.prepare([case], workers_of(1))
     made = sorted((panels.beside / "real").iterdir())
-    panels.prepare([case], 1)
+    panels.prepare([case], workers_of(1))
     assert sorted((panels.beside / "real").iterdir()) == made
     day, night = (panels.opened(drive, case) for drive in (case.database, case.query))
     assert len(day) == pytest.approx(60 / case.every, abs=1)
