@@ -83,8 +83,9 @@ def test_z_scores_of_what_is_listed_are_those_of_a_whole_row(
         np.testing.assert_allclose(robust_z(row)[listed], wanted[listed], atol=near)
         np.testing.assert_allclose(opened.some(image[None], listed)[0], wanted[listed], atol=near)
         if not opened._search.compares_all:
-            np.testing.assert_allclose(row[ordered(ITEMS)], wanted[ordered(ITEMS)], atol=near)
-            assert ITEMS // 2 - 1 <= len(listed) <= ITEMS // 2 + 100
+            not_seen = set(np.arange(ITEMS)[ordered(ITEMS)]) - set(listed)
+            assert len(not_seen) <= 1  # the median, which may be 0
+            assert ITEMS // 2 < len(listed) <= ITEMS // 2 + 100
 
 
 @given(st.integers(2, 60), st.integers(0, 99), st.floats(0.1, 3))
