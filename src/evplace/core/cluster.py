@@ -45,6 +45,8 @@ ADDRESS = "RAY_ADDRESS"
 """The variable by which Ray itself is told where its head is."""
 FOUND_S = 5.0
 """So many seconds a head may take to answer."""
+KNOWN = Path(os.environ.get("RAY_TMPDIR", "/tmp"), "ray", "ray_current_cluster")
+"""Where Ray notes the address of this machine's own cluster."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """Variables that count threads, which may change the last bits: as the caller has them, not as Ray has."""
 HOW = "`ray start` begins one here, or has this machine join one"
@@ -219,7 +221,9 @@ def _connected(address: str) -> Iterator[Any]:
 def _check_head(address: str) -> None:
     """OutputError where nobody answers at HOST:PORT; Ray itself tries for minutes."""
     if address == "auto":
-        return
+        if not KNOWN.is_file():
+            return
+        address = KNOWN.read_text().strip()  # a head that was killed leaves it
     host, _, port = address.rpartition(":")
     if not (host and port.isdecimal()) or "/" in host:
         raise SettingsError(
