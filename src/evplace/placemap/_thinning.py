@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.placemap._parts import JoinedRows, Part
-from evplace.scorers import opened_together, scorer_of, thinned
+from evplace.scorers import OpenScorer, opened_together, thinned
 
 if TYPE_CHECKING:
     from evplace.placemap import PlaceMap
@@ -64,16 +64,15 @@ def useful(parts: Sequence[Part], new: Part) -> Bools:
     few = [content for content in contents if content is not None]
     if not few or len(few) < len(contents):
         return np.ones(len(new.item), np.bool_)
-    known = JoinedRows(opened_together(new.map.scorer, few), [part.item[chosen] for part, chosen in seen])
-    return _winners(new, known)
+    own, *others = opened_together(new.map.scorer, [new.map.content, *few])
+    return _winners(new, own, JoinedRows(others, [part.item[chosen] for part, chosen in seen]))
 
 
-def _winners(new: Part, known: JoinedRows) -> Bools:
+def _winners(new: Part, own: OpenScorer, known: JoinedRows) -> Bools:
     """(references,) which are better than what is known, for an image beside them, or cannot be judged."""
     rival = np.minimum(np.searchsorted(known.items, new.item), len(known.items) - 1)
     rivals = known.items[rival] == new.item
     wins, judged = np.zeros((2, len(new.item)), np.bool_)
-    own = scorer_of(new.map.scorer).open(new.map.content)
     for at, beside in enumerate(_beside(new.map)):
         asked = beside[rivals[beside]]
         if not len(asked):

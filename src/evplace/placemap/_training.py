@@ -26,7 +26,7 @@ from evplace.scorers.network import Network
 
 MOST_OWN = 3000
 """Own images of a map of several drives on which it is measured."""
-MOST_CELLS, LEAST_OWN = 12_000_000, 200
+MOST_CELLS, LEAST_OWN = 10_000_000, 150
 """Own images times items, for a drive that comes to a large map: seconds; but no fewer images than this."""
 
 
