@@ -129,8 +129,9 @@ def run_all(
     """Do all `jobs` in processes of `module`, which calls `serve`, in their order; they write into `folder`.
 
     `report` gets the job's index and each line that it prints, one call at a time. A job whose worker is
-    killed is done again, up to MOST_TRIES times. The first error ends all, the worker's own or
-    WorkerLostError; where `failed` is given, it gets each, and the other jobs go on.
+    killed is done again, up to MOST_TRIES times; what it had printed comes again, or was lost with it. The
+    first error ends all, the worker's own or WorkerLostError; where `failed` is given, it gets each, and the
+    other jobs go on.
     """
     running, ended, alone = workers.begin(folder), Event(), Lock()
 
