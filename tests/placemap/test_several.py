@@ -178,6 +178,21 @@ def test_what_a_map_of_several_drives_tells_of_itself(bright: Traverse, two: Pla
     assert {match.state for match in where.match_traverse(street(2, 0.04))} >= {"localised"}
 
 
+def test_of_a_large_map_only_what_is_new_is_measured(
+    one: PlaceMap, dusk: Traverse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured = calibrate(one, Bayes())
+    assert measured.learned is not None
+    monkeypatch.setattr("evplace.placemap._training.MOST_CELLS", 1)
+    monkeypatch.setattr("evplace.placemap._training.LEAST_OWN", 5)
+    more = add(measured, dusk).learned
+    assert more is not None
+    before = measured.learned["unknown_live"]
+    after = more["unknown_live"]
+    assert len(before) < len(after) < len(before) + 5 * 24  # of each way to cut the map, five at most
+    assert np.isin(before, after).all()
+
+
 def test_drives_that_lie_on_the_disk_are_not_written_again(
     one: PlaceMap, dusk: Traverse, tmp_path: Path
 ) -> None:

@@ -60,9 +60,9 @@ class Strangers(NamedTuple):
     """(unknown, features) and when what comes later is known."""
 
 
-def measured(route: Route, rows: Callable[[slice], Rows]) -> Learned:
+def measured(route: Route, rows: Callable[[slice], Rows], least: int = LEAST_UNKNOWN) -> Learned:
     """What `Bayes` learns; nothing from a map too short or too small to be measured."""
-    found = strangers(route, rows)
+    found = strangers(route, rows, least)
     if found is None:
         return {}
     return {
@@ -83,7 +83,7 @@ def together(before: Learned, more: Learned) -> Learned:
     return {WRONG: wrong, CONTENT: content, **both}
 
 
-def strangers(route: Route, rows: Callable[[slice], Rows]) -> Strangers | None:
+def strangers(route: Route, rows: Callable[[slice], Rows], least: int = LEAST_UNKNOWN) -> Strangers | None:
     """Localise a map's images on what is left of it; None for a map too short or too small for that."""
     ways = Ways.of(route)
     items = len(ways.way)
@@ -98,7 +98,7 @@ def strangers(route: Route, rows: Callable[[slice], Rows]) -> Strangers | None:
     each = list(zip(drives, np.split(own, np.cumsum([len(drive) for drive in drives])[:-1]), strict=True))
     unknown = [_trial(route, ways, *one, learned, keep) for keep in _cuts(ways) for one in each]
     live, late = (np.concatenate(column) for column in zip(*unknown, strict=True))
-    return None if len(live) < LEAST_UNKNOWN else Strangers(learned, live, late)
+    return None if len(live) < least else Strangers(learned, live, late)
 
 
 def _wrong(ways: Ways, own: Rows, at: Ints) -> Floats:

@@ -83,7 +83,7 @@ class Bayes:
 
     def learn_more(self, before: Learned, route: Route, rows: Callable[[slice], Rows]) -> Learned:
         """See LearnsMore."""
-        return together(before, measured(route, rows))
+        return together(before, measured(route, rows, least=1))
 
     def follow(self, route: Route, distances: bool = False) -> Following:  # noqa: ARG002 - a distance is -d
         """See RouteMatcher."""
