@@ -86,7 +86,7 @@ def test_the_job_of_a_killed_worker_is_done_again(
     job = {"does": "lose", "whom": whom, "mark": str(tmp_path / "mark"), "number": 1}
     with pytest.warns(UserWarning, match="its job is done again"):
         run_all("far_worker", [job], workers, folder, lambda _, line: lines.append(line))
-    assert lines == ["on its way", "done 1"]
+    assert lines in (["on its way", "done 1"], ["done 1"])  # what was on its way may be lost with the worker
 
 
 def test_a_full_disk_is_one_line_and_leaves_nothing(workers: Workers, folder: Path, tmp_path: Path) -> None:
