@@ -70,7 +70,7 @@ class Silences:
 
 
 def _silent(times: Times) -> Times:
-    """The numbers of times (n,) after which nothing comes for SHORTEST_US; most often none, which few tell."""
+    """The numbers of times (n,) after which nothing comes for SHORTEST_US; mostly none, which a few tell."""
     if len(times) and np.diff(times[::TOLD], append=times[-1:]).max() < SHORTEST_US:
         return np.zeros(0, np.int64)
     return np.flatnonzero(np.diff(times) >= SHORTEST_US)

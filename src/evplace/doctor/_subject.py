@@ -23,8 +23,8 @@ _LONGEST = 1 << 23
 SOON_US = 1000
 """A pixel whose last event is less than so long ago repeats itself."""
 STAMP_BITS = 21
-"""A pixel is one number of 32 bits, its count above so many bits of its last time: what is far apart in memory
-costs more than all else."""
+"""A pixel is one number of 32 bits, its count above so many bits of its last time: what is far apart in
+memory costs more than all else."""
 COUNTED = 1 << 32 - STAMP_BITS
 """Events that no longer fit beside the time are counted elsewhere."""
 AGO_US = 1 << 10

@@ -72,8 +72,9 @@ class FlickerMeter:
         if len(events) and self._start_us[0] == np.iinfo(np.int64).min:
             self._start_us[0] = events.t_us[0]
         _beat(
-            events.t_us, events.x, events.y, events.p.view(np.uint8), self._row, self._column, self.window_us, self._waves,
-            self._start_us, self._sums, self._totals, self._events, self._power, self._pairs,
+            events.t_us, events.x, events.y, events.p.view(np.uint8), self._row, self._column,
+            self.window_us, self._waves, self._start_us, self._sums, self._totals, self._events,
+            self._power, self._pairs,
         )  # fmt: skip
 
     def pairs(self) -> NDArray[np.float64]:
@@ -148,7 +149,7 @@ def _beat(
     t_us: NDArray[np.int64],
     x: NDArray[np.uint16],
     y: NDArray[np.uint16],
-    p: Mask,
+    p: NDArray[np.uint8],
     row: Counts,
     column: Counts,
     window_us: int,
@@ -163,8 +164,10 @@ def _beat(
     """Sum signed waves in the window from start_us[0]; a complete window goes to power and pairs.
 
     `row` + `column` is the region. Sums are whole numbers; before one can pass 16 bits, it goes to `totals`.
+    `p` comes as numbers, from which a sign is computed: a branch would go wrong half the time.
     """
-    columns, summed = np.uint64(waves.shape[1]), np.uint64(_SUMMED)  # unsigned: an index from the start
+    # Unsigned, so that an index needs no look whether it counts from the end.
+    columns, summed = np.uint64(waves.shape[1]), np.uint64(_SUMMED)
     start = start_us[0]
     for i in range(len(t_us)):
         if t_us[i] - start >= window_us:
