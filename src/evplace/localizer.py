@@ -498,13 +498,12 @@ def _matcher(
 def check_rows(rows: object, images: int, place_map: PlaceMap, items: int | None = None) -> None:
     """PartError where a scorer gives anything but finite (images, items) scores; of all items or some."""
     wanted = (images, len(place_map.items) if items is None else items)
-    kind, unfinite = type(rows).__name__, ""
-    if isinstance(rows, np.ndarray):
-        kind = f"{rows.dtype} {rows.shape}"
-        if rows.shape == wanted and rows.dtype.kind in "fiu":
-            if np.isfinite(rows).all():
-                return
-            unfinite = " with NaN or infinity"
+    unfinite = ""
+    if isinstance(rows, np.ndarray) and rows.shape == wanted and rows.dtype.kind in "fiu":
+        if np.isfinite(rows).all():
+            return
+        unfinite = " with NaN or infinity"
+    kind = f"{rows.dtype} {rows.shape}" if isinstance(rows, np.ndarray) else type(rows).__name__
     raise PartError(
         f"{families.described('scorers', place_map.scorer)} must give finite scores {wanted} for {images} "
         f"images and {wanted[1]} items, it gave {kind}{unfinite}"

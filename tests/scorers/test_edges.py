@@ -103,9 +103,11 @@ def test_directions_are_shared_as_by_a_remainder(orientations: int) -> None:
     at = rng.uniform(-orientations, orientations, (2, 9, 9)).astype(np.float32)
     at[0, 0] = np.linspace(-orientations, orientations, 9)
     half, turn = np.float32(orientations / 2), np.float32(orientations)
-    for bin_, found in enumerate(edges._shares(at, orientations).swapaxes(0, 1)):
+    length, shares = rng.random(at.shape).astype(np.float32), np.empty((2, orientations, 9, 9), np.float32)
+    edges._share_out(at, length, shares)
+    for bin_, found in enumerate(shares.swapaxes(0, 1)):
         away = np.abs(np.mod(at - np.float32(bin_) + half, turn) - half)
-        np.testing.assert_array_equal(found, np.maximum(1 - away, 0))
+        np.testing.assert_array_equal(found, length * np.maximum(1 - away, 0))
 
 
 def test_slopes_are_numpys() -> None:

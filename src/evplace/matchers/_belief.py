@@ -81,9 +81,9 @@ class Filter:
     def see(self, z: NDArray[np.float32], weight: float) -> Floats:
         """(references,) the belief after one more row of z-scores of an image of some weight."""
         says = weight * self.says
-        loops.weigh(self.belief, self.evidence, around.cells(z), says, np.exp(says))
+        loops.weigh(self.belief, self.evidence, z, says, np.exp(says))
         marginal = np.empty(len(self.belief))
-        loops.share_out(self.belief, self.belief.sum(), marginal)
+        loops.share_out(self.belief.reshape(-1), self.belief.sum(), marginal)
         return marginal
 
     def go_on(self, before: Filter, came_from: NDArray[np.int64]) -> None:
