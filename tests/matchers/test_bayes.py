@@ -198,7 +198,7 @@ def test_images_further_apart_tell_more_each() -> None:
     for apart_s in (0.05, 0.1, 0.2, 0.6, 1.0, 30.0):
         clock = belief.Clock()
         told[apart_s] = [clock.see(Seen(round(at * apart_s * 1e6), 1.0))[0] for at in range(3)][-1]
-    wanted = {0.05: 0.5, 0.1: 1.0, 0.2: 1.0, 0.6: 1.5, 1.0: 2.0, 30.0: 2.0}
+    wanted = {0.05: 0.5, 0.1: 1.0, 0.2: 1.0, 0.6: 1.25, 1.0: 1.5, 30.0: 1.5}
     assert told == pytest.approx(wanted)
 
 
