@@ -20,7 +20,7 @@ from made_pages import ROOT, Block, blocks, pages, write_drives
 
 ONLY_READ = {
     "evplace city": "drives for minutes",
-    "evplace bench": "needs that city",
+    "evplace bench": "needs a city",
     "evplace demo": "drives for minutes",
     "evplace sample": "drives for a minute",
     "evplace reproduce": "trains for an hour",

@@ -56,7 +56,7 @@ def _pair(result: Result, image: NDArray[np.uint8], of_items: ItemImages, query:
 
 
 def _sized(shown: Picture) -> Picture:
-    """In the middle of WIDEST pixels, as large as fits; by whole steps if small, so that pixels stay square."""
+    """In the middle of WIDEST pixels, as large as fits; small ones by whole steps: pixels stay square."""
     height, width = shown.shape[:2]
     if width > WIDEST or height > HIGHEST:
         picture = Image.fromarray(shown)
