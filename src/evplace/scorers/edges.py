@@ -18,6 +18,8 @@ from evplace.scorers._reduction import blurred, grey, reduced, reduction, unit
 
 Values = NDArray[np.float32]
 """(n, h, w)."""
+FEW_PIXELS = 600
+"""An image of fewer has none to spare: it is not smoothed, and its cells are half as long (ours)."""
 FLAT = 1e-4
 """An image whose values, from 0 to 1, differ by less has no contrast but rounding."""
 SURROUNDINGS = 10.0
@@ -46,8 +48,9 @@ class Edges:
         """(n, dimensions): contrast and directions, each of length 1/sqrt(2), or 0 without any contrast."""
         height, width = self._size(*images.shape[1:3])
         values = np.sqrt(reduced(grey(images), height, width) / np.float32(255))
-        smooth = blurred(values, 0.7)
-        contrast, directions = unit(_contrast(smooth), 0.0), unit(self._directions(smooth), 0.0)
+        few = height * width < FEW_PIXELS
+        smooth, cell = (values, max(self.cell // 2, 1)) if few else (blurred(values, 0.7), self.cell)
+        contrast, directions = unit(_contrast(smooth), 0.0), unit(self._directions(smooth, cell), 0.0)
         vectors = np.concatenate([contrast, directions], axis=1) * np.float32(np.sqrt(0.5))
         vectors[np.ptp(values, axis=(1, 2)) < FLAT] = 0
         return vectors
@@ -57,14 +60,14 @@ class Edges:
         scale = min(1.0, (self.pixels / (height * width)) ** 0.5)
         return max(round(height * scale), 1), max(round(width * scale), 1)
 
-    def _directions(self, values: Values) -> NDArray[np.float32]:
+    def _directions(self, values: Values, cell: int) -> NDArray[np.float32]:
         """(n, orientations, rows, columns) how much of each cell's edges runs which way, around its mean."""
         down, across = (_slope(values, axis) for axis in (1, 2))
         length = np.hypot(down, across)
         at = np.arctan2(down, across) * np.float32(self.orientations / np.pi)
         shares = np.empty((len(values), self.orientations, *values.shape[1:]), np.float32)
         _share_out(at, length, shares)
-        rows, columns = (_cells(side, self.cell) for side in values.shape[1:])
+        rows, columns = (_cells(side, cell) for side in values.shape[1:])
         histogram = rows @ shares @ columns.T
         strength = blurred(np.sqrt(np.square(histogram).sum(1)), 1.0)
         strength = strength + np.float32(0.02) * strength.mean((1, 2), keepdims=True) + np.float32(1e-6)
