@@ -3,7 +3,7 @@
     OPENBLAS_NUM_THREADS=1 python bench/bench_answers.py [--references 10000]
 
 10,000 references of 160x90, a 640x480 sensor; the network has 1,000 places of ten of them each. The window is
-closed by `tick`, so its image is in the time, too. For an image the network reads 74 MB, edges 88, sad 144,
+closed by `tick`, so its image is in the time, too. The network reads 74 MB an image, edges 88, sad 144 and
 cosine 576.
 """
 
