@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from evplace.core import _machine_code
+from evplace.core import _bitcode, _code_files, _machine_code
+from evplace.core._arguments import is_known_here
 from evplace.core.compiled import njit
 
-pytestmark = pytest.mark.skipif(not _machine_code._is_known_here(), reason="never tried on this system")
+pytestmark = pytest.mark.skipif(not is_known_here(), reason="never tried on this system")
 
 
 class Pair(NamedTuple):
@@ -134,6 +135,7 @@ def test_it_is_made_where_nothing_can_be_kept(tmp_path: Path, monkeypatch: pytes
 
 SOURCE = """
 import sys
+from evplace.core._arguments import is_known_here
 from evplace.core.compiled import njit
 @njit(cache=True)
 def number(by: int) -> int:
