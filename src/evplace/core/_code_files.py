@@ -28,7 +28,7 @@ from evplace.core._arguments import DATA
 FORMAT = 2
 """Of the files; counted up where an entry is called otherwise."""
 SHIPPED = Path(__file__).with_name("_shipped")
-"""The package's own folder of bitcode; `python -m evplace_lab.ahead` fills it."""
+"""The package's own folder of bitcode; `python -m evplace_lab.cli.ahead` fills it."""
 CHECKSUM = 32
 CONSTANTS = (bool, int, float, complex, str, tuple, np.generic, np.ndarray)
 """What a compiled loop may use by name, and holds as it was then."""
@@ -95,7 +95,9 @@ def _digest(words: Iterable[str]) -> str:
 
 def _sources(loop: Any, kinds: Iterable[Any]) -> list[str]:
     """All that a loop reaches: files by their checksums, constants by their values, and its options."""
-    found = {str(sorted(loop.options.items()))}
+    found = {
+        f"{name} {sorted(value) if name == 'fastmath' else value}" for name, value in loop.options.items()
+    }
     seen: set[Any] = set()
     waiting = [loop, *filter(inspect.isclass, kinds)]
     while waiting:

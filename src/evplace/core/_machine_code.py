@@ -1,8 +1,8 @@
 """The machine code of compiled loops: loading it takes a tenth of the time of importing numba.
 
 numba gives a loop as LLVM's bitcode, once for all processors of a kind, and that may come with the package.
-llvmlite alone makes machine code of it, which is kept for the next time, and loads it. On systems where it was
-never tried, and for loops that need more, numba does all as ever.
+llvmlite alone makes machine code of it, which is kept for the next time, and loads it. On systems where it
+was never tried, and for loops that need more, numba does all as ever.
 """
 
 from __future__ import annotations
