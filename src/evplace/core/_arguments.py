@@ -23,12 +23,20 @@ PLAIN = 0x101
 NUMBERS = frozenset("?bBhHiIlLqQfd")
 """Types of numbers that arrays may hold."""
 
+
+class _Two(ctypes.c_int64 * 2):  # type: ignore[misc]
+    @property
+    def value(self) -> tuple[int, ...]:
+        return tuple(self)
+
+
 RETURNS: dict[str, Any] = {
     "none": None,
     "bool": ctypes.c_bool,
     "int64": ctypes.c_int64,
     "uint64": ctypes.c_uint64,
     "float64": ctypes.c_double,
+    "UniTuple(int64 x 2)": _Two,
 }
 """What a loop may return, by numba's name."""
 Kinds = tuple[Any, ...]

@@ -79,10 +79,10 @@ def run(line: str) -> None:
 
 
 def decoding_loops() -> Iterator[Any]:
-    """Those that hand events to a sink."""
+    """Of all formats."""
     for module in [*(module for _, module in families.loadable("readers")), _ros_encodings]:
-        for value in vars(module).values():
-            if hasattr(value, "dispatcher") and "sink" in inspect.signature(value).parameters:
+        for name, value in vars(module).items():
+            if name.startswith("_decode") and hasattr(value, "dispatcher"):
                 yield value
 
 
