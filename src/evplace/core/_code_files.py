@@ -28,7 +28,7 @@ from evplace.core._arguments import DATA
 FORMAT = 2
 """Of the files; counted up where an entry is called otherwise."""
 SHIPPED = Path(__file__).with_name("_shipped")
-"""The package's own folder of bitcode; `python -m evplace_lab.cli.ahead` fills it."""
+"""The package's own folder of bitcode; `python -m evplace_lab.cli.precompile` fills it."""
 CHECKSUM = 32
 CONSTANTS = (bool, int, float, complex, str, tuple, np.generic, np.ndarray)
 """What a compiled loop may use by name, and holds as it was then."""

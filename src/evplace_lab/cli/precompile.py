@@ -1,6 +1,6 @@
 """Compiles ahead of time what the first commands of a user need, as bitcode that comes with the package.
 
-    python -m evplace_lab.cli.ahead
+    python -m evplace_lab.cli.precompile
 
 A small made drive goes through the commands, and nothing through each loop that decodes; what numba made of
 all those loops is then put beside the package's code, in place of what lay there. It is used by no other
