@@ -42,14 +42,14 @@ def test_a_loop_that_decodes_nothing_is_called_as_by_its_reader(
 
 FILL = """
 from evplace_lab.cli import precompile
-precompile.COMMANDS = ("images day.raw -o images",)
+precompile.COMMANDS = ("info day.npz",)
 precompile.decoding_loops = lambda: []
 precompile.main()
 """
 FIRST = """
 import sys
 from evplace.cli import main
-main(["images", "day.raw", "-o", "others"])
+main(["info", "day.npz"])
 print("numba" in sys.modules)
 """
 
