@@ -1,7 +1,9 @@
-"""Frames of the city a second of CPU, whole drives with three sensors: python bench/bench_city.py [--before CHECKOUT]
+"""Frames of the city a second of CPU, whole drives with three sensors.
 
-160x120 as the benchmark is made: rendering, sensors, images and writing; the time before the first image, which
-builds the town, is left out. With another checkout, both make the same drives in alternation.
+    python bench/bench_city.py [--before CHECKOUT]
+
+160x120 as the benchmark is made: rendering, sensors, images and writing; the time before the first image,
+which builds the town, is left out. With another checkout, both make the same drives in alternation.
 """
 
 from __future__ import annotations
