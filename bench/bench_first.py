@@ -2,9 +2,9 @@
 
     python bench/bench_first.py dist/evplace-0.1.0-py3-none-any.whl RECORDING [QUERY]
 
-In an environment of its own, with nothing compiled before. RECORDING needs no log of positions: its places are
-runs of ten images, and without a QUERY it is found again in itself. What pip loads from elsewhere takes no CPU,
-but time, as the network is.
+In an environment of its own, with nothing compiled before. RECORDING needs no log of positions: its places
+are runs of ten images, and without a QUERY it is found again in itself. What pip loads from elsewhere takes
+time, as the network is, but no CPU.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from harness import cpu_seconds, processor
 
 
 def cpu_of(folder: Path, command: list[str]) -> tuple[float, str]:
-    """Seconds, of all that a command starts, and what it printed; damage at a recording's end is no matter."""
+    """Seconds of all that a command starts, and what it printed; a recording whose end is damaged will do."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "compiled"), "XDG_CACHE_HOME": str(folder)}
     environment.pop("PYTHONPATH", None)
     before = cpu_seconds()
