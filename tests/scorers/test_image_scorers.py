@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
 from evplace.scorers import Rows, scorer_of
-from evplace.scorers._reduction import reduction
+from evplace.scorers._reduction import reduction, small
 from evplace.scorers._seqslam_images import prepare
 from evplace.scorers.cosine import Cosine
 from evplace.scorers.ncc import NCC
@@ -54,6 +54,16 @@ def test_ncc_ignores_brightness_and_contrast_and_finds_itself() -> None:
 def test_ncc_of_an_image_without_contrast_is_nothing() -> None:
     rows = rows_of(NCC(), images(3, (20, 30)), np.full((1, 20, 30), 7, np.uint8))
     assert (rows == 0).all()
+
+
+@pytest.mark.parametrize("shape", [(6, 10), (5, 9), (3, 5), (2, 20), (6, 10, 3)])
+def test_small_images_are_products_to_the_bit(shape: tuple[int, ...]) -> None:
+    """Half the sides, which take another way, and any others."""
+    images = np.random.default_rng(0).integers(0, 256, (4, *shape), np.uint8)
+    grey = images.astype(np.float32)
+    grey = grey if grey.ndim == 3 else grey @ np.array([0.299, 0.587, 0.114], np.float32)
+    rows, columns = reduction(shape[0], 3, 0.0), reduction(shape[1], 5, 0.0)
+    np.testing.assert_array_equal(small(images, 3, 5), rows @ grey @ columns.T)
 
 
 def test_the_reduction_keeps_means() -> None:

@@ -20,6 +20,19 @@ def grey(images: NDArray[np.uint8]) -> NDArray[np.float32]:
     return np.asarray(values @ GREY if values.shape[-1] == 3 else values.mean(-1), np.float32)
 
 
+def small(images: NDArray[np.uint8], height: int, width: int) -> NDArray[np.float32]:
+    """(n, h, w) or (n, h, w, C) -> (n, height, width) grey: each pixel the mean over its share of the image.
+
+    Half as high and wide it is a quarter of the sum of four whole numbers, exact without a product, too.
+    """
+    if images.shape[1:] == (2 * height, 2 * width):
+        pairs = images[:, ::2].astype(np.uint16) + images[:, 1::2]
+        return np.asarray((pairs[:, :, ::2] + pairs[:, :, 1::2]) * np.float32(0.25), np.float32)
+    values = grey(images)
+    rows, columns = values.shape[1:]
+    return _product(reduction(rows, height, 0.0), values, reduction(columns, width, 0.0))
+
+
 def reduced(values: NDArray[np.float32], height: int, width: int) -> NDArray[np.float32]:
     """(n, h, w) -> (n, height, width) at most: the mean over each output's share of the pixels."""
     rows, columns = values.shape[1:]

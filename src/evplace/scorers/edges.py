@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from evplace.core.compiled import njit
 from evplace.core.errors import SettingsError
-from evplace.scorers._reduction import blurred, grey, reduced, reduction, unit
+from evplace.scorers._reduction import blurred, reduced, reduction, small, unit
 
 Values = NDArray[np.float32]
 """(n, h, w)."""
@@ -47,7 +47,7 @@ class Edges:
     def describe(self, images: NDArray[np.uint8]) -> NDArray[np.float32]:
         """(n, dimensions): contrast and directions, each of length 1/sqrt(2), or 0 without any contrast."""
         height, width = self._size(*images.shape[1:3])
-        values = np.sqrt(reduced(grey(images), height, width) / np.float32(255))
+        values = np.sqrt(small(images, height, width) / np.float32(255))
         few = height * width < FEW_PIXELS
         smooth, cell = (values, max(self.cell // 2, 1)) if few else (blurred(values, 0.7), self.cell)
         contrast, directions = unit(_contrast(smooth), 0.0), unit(self._directions(smooth, cell), 0.0)

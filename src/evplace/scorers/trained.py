@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from evplace.core.errors import InputError, TraverseError
 from evplace.core.storage import read_bytes, read_json
-from evplace.scorers._reduction import grey, reduction
+from evplace.scorers._reduction import small
 
 FOLDER = Path(__file__).parent / "_trained"
 WEIGHTS, ABOUT = "descriptor.onnx", "descriptor.json"
@@ -69,17 +69,10 @@ class DescriptorGraph:
             )
         vectors = np.zeros((len(images), DIMENSIONS), np.float32)
         for number in range(len(images)):
-            small = _reduced(images[number : number + 1])
-            if np.ptp(small) > FLAT:
-                vectors[number] = self._session.run(None, {INPUT: small})[0][0]
+            seen = np.ascontiguousarray(small(images[number : number + 1], HEIGHT, WIDTH))
+            if np.ptp(seen) > FLAT:
+                vectors[number] = self._session.run(None, {INPUT: seen})[0][0]
         return vectors
-
-
-def _reduced(images: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """(n, 45, 80): each pixel the mean over its share of the image."""
-    values = grey(images)
-    rows, columns = (reduction(a, b, 0.0) for a, b in zip(values.shape[1:], (HEIGHT, WIDTH), strict=True))
-    return np.ascontiguousarray(rows @ values @ columns.T)
 
 
 @functools.cache
