@@ -6,7 +6,8 @@ FROM python:3.12-slim AS build
 WORKDIR /src
 COPY pyproject.toml README.md LICENSE ./
 COPY src src
-RUN python -m venv /opt/evplace && /opt/evplace/bin/pip install --no-cache-dir '.[report,hdf5,parquet,video,web]'
+RUN python -m venv /opt/evplace && /opt/evplace/bin/pip install --no-cache-dir '.[report,hdf5,parquet,video,web]' \
+    && /opt/evplace/bin/python -m evplace_lab.cli.precompile
 
 FROM python:3.12-slim
 COPY --from=build /opt/evplace /opt/evplace

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,10 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from evplace.core import _machine_code
+from evplace.core import _bitcode, _code_files, _machine_code
+from evplace.core._arguments import is_known_here
 from evplace.core.compiled import njit
+from evplace.sources.readers import _canvas, _checks, evt3
 
-pytestmark = pytest.mark.skipif(not _machine_code._is_known_here(), reason="never tried on this system")
+pytestmark = pytest.mark.skipif(not is_known_here(), reason="never tried on this system")
 
 
 class Pair(NamedTuple):
@@ -64,11 +67,12 @@ def half_of(number: int, by: int) -> float:
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder for what is kept; loops know of no entry yet."""
+    """An empty folder for what is kept; loops know of no entry yet, and none comes with the package."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(_code_files, "SHIPPED", tmp_path / "shipped")
     for loop in (weighed, filled, within, doubled, half_of):
         monkeypatch.setattr(loop, "_entries", {})
-    return tmp_path / "evplace"
+    return tmp_path / "evplace" / _code_files._environment()
 
 
 def test_it_says_what_numba_says_of_all_kinds_of_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,7 +102,7 @@ def test_a_loop_that_makes_arrays_is_called_by_numba_and_that_is_remembered(
     assert doubled(np.arange(3)).tolist() == [0, 2, 4]
     assert list(doubled._entries.values()) == [None]
     monkeypatch.setattr(doubled, "_entries", {})
-    monkeypatch.setattr(_machine_code, "_compiled_alone", lambda *_: pytest.fail("tried again"))
+    monkeypatch.setattr(_bitcode, "bitcode_of", lambda *_: pytest.fail("tried again"))
     assert doubled(np.arange(3)).tolist() == [0, 2, 4]
 
 
@@ -143,7 +147,9 @@ print(number(3), "numba" in sys.modules)
 """
 
 
-def test_a_changed_source_is_compiled_anew_and_an_unchanged_one_needs_no_numba(tmp_path: Path) -> None:
+def test_a_changed_source_is_compiled_anew_and_an_unchanged_one_needs_no_numba(
+    tmp_path: Path, folder: Path
+) -> None:
     file, said = tmp_path / "loops.py", []
     for number in (2, 2, 51):
         source = SOURCE.format(number=number)
@@ -152,4 +158,111 @@ def test_a_changed_source_is_compiled_anew_and_an_unchanged_one_needs_no_numba(t
         child = subprocess.run([sys.executable, file], capture_output=True, text=True, check=True)
         said.append(child.stdout.split())
     assert said == [["6", "True"], ["6", "False"], ["153", "True"]]
-    assert len(list((tmp_path / "evplace").iterdir())) == 1
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_a_loop_whose_source_cannot_be_read_is_called_by_numba(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.modules[__name__], "__file__", "/no/such/file")
+    values = np.zeros(2, np.int32)
+    filled(values, 6)
+    assert values.tolist() == [6, 6]
+    assert not folder.exists()
+
+
+def ship(loop: Any, *arguments: Any) -> Path:
+    """Have a loop's code come with the package, and nothing kept of it."""
+    loop(*arguments)
+    (name,) = (_code_files.name_of(loop, kinds) for kinds in loop._entries)
+    assert name is not None
+    _code_files.ship(name, _machine_code.made[name])
+    loop._entries.clear()
+    return _code_files.SHIPPED / name
+
+
+def test_what_comes_with_the_package_is_not_compiled_again(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ship(filled, np.zeros(2, np.int32), 5)
+    shutil.rmtree(folder)
+    values = np.zeros(2, np.int32)
+    with monkeypatch.context() as without:
+        without.setattr(_bitcode, "bitcode_of", lambda *_: pytest.fail("compiled"))
+        filled(values, 6)
+    assert values.tolist() == [6, 6]
+    assert len(list(folder.iterdir())) == 1
+
+
+def test_what_comes_with_the_package_but_cannot_be_read_is_compiled(folder: Path) -> None:
+    file = ship(filled, np.zeros(2, np.int32), 5)
+    shutil.rmtree(folder)
+    _code_files.ship(file.name, _code_files.Code("none", b"of another LLVM"))
+    values = np.zeros(2, np.int32)
+    filled(values, 6)
+    assert values.tolist() == [6, 6]
+    assert all(filled._entries.values())
+
+
+def is_read(folder: Path) -> bool:
+    """Whether the one file that is kept is found."""
+    (file,) = folder.iterdir()
+    return _code_files.kept(file.name) is not None
+
+
+def test_nothing_is_kept_where_others_may_write(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    filled(np.zeros(2, np.int32), 5)
+    assert is_read(folder)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    folder.chmod(0o770)
+    assert not is_read(folder)
+    folder.chmod(0o700)
+    monkeypatch.setattr(_code_files.os, "geteuid", lambda: folder.stat().st_uid + 1)
+    assert not is_read(folder)
+    _code_files.keep("another", _code_files.UNFIT)
+    assert len(list(folder.iterdir())) == 1
+    monkeypatch.undo()
+
+
+def test_a_link_is_no_folder_of_the_users_own(folder: Path) -> None:
+    filled(np.zeros(2, np.int32), 5)
+    folder.rename(folder.with_name("elsewhere"))
+    folder.symlink_to("elsewhere")
+    assert not is_read(folder)
+
+
+def test_a_file_that_was_moved_is_not_taken_for_another(folder: Path) -> None:
+    filled(np.zeros(2, np.int32), 5)
+    (file,) = folder.iterdir()
+    file.rename(folder / "another.name")
+    assert _code_files.kept("another.name") is None
+
+
+WRITER = """
+from evplace.core._code_files import Code, keep, kept
+for number in range(300):
+    keep("loop.source", Code("none", bytes([number % 256]) * 5000))
+    code = kept("loop.source")
+    assert code is None or len(set(code.content)) == 1 and len(code.content) == 5000
+"""
+
+
+def test_processes_that_write_one_file_do_not_meet(folder: Path) -> None:
+    """Each reads all of what one of them wrote."""
+    children = [subprocess.Popen([sys.executable, "-c", WRITER]) for _ in range(3)]
+    assert [child.wait() for child in children] == [0, 0, 0]
+    assert is_read(folder)
+
+
+@pytest.mark.parametrize("name", ["JUMP_US", "timely"])
+def test_code_depends_on_what_other_modules_hold(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A decoder reaches both by what is said to numba before it is compiled."""
+    before = _code_files.name_of(evt3._decode, ())
+    monkeypatch.setattr(_checks if name == "JUMP_US" else _canvas, name, 5)
+    assert _code_files.name_of(evt3._decode, ()) != before
+
+
+def test_code_depends_on_options(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = _code_files.name_of(filled, ())
+    monkeypatch.setitem(filled.options, "error_model", "numpy")
+    assert _code_files.name_of(filled, ()) != before

@@ -16,7 +16,6 @@ from typing import Any
 
 import tyro
 
-from evplace.cli._folders import facts_of
 from evplace.cli._output import USED_GOOD_PART, note, print_facts, print_json
 from evplace.cli._recording import RecordingFlags
 from evplace.core.errors import DamagedRecordingError
@@ -34,6 +33,10 @@ class Args(RecordingFlags):
 
 def run(args: Args) -> int:
     """Say what is in it; a recording is read to its end."""
+    if not args.path.is_dir():
+        return _recording(args)
+    from evplace.cli._folders import facts_of
+
     known = facts_of(args.path)
     if known is None:
         return _recording(args)

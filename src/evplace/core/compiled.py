@@ -8,8 +8,9 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-from evplace.core import _machine_code
-from evplace.core._machine_code import Entry, Kinds, UnfitError, flattened
+from evplace.core import _bitcode
+from evplace.core._arguments import Kinds, UnfitError, flattened
+from evplace.core._machine_code import Entry, entry_of
 
 SEEN_AT_WORK = any(name.startswith("NUMBA_") and name != "NUMBA_CACHE_DIR" for name in os.environ)
 """Whoever sets numba's variables wants to see numba itself at work."""
@@ -31,7 +32,7 @@ class _Compiled:
     def __init__(
         self, loop: Callable[..., Any], options: dict[str, Any], before: Callable[[], None] | None
     ) -> None:
-        self.loop, self.options, self._before = loop, options, before
+        self.loop, self.options, self.before = loop, options, before
         self._entries: dict[Kinds, Entry | None] = {}
         self._kept = bool(options.get("cache")) and not SEEN_AT_WORK
         functools.update_wrapper(self, loop)
@@ -50,7 +51,7 @@ class _Compiled:
         """Its machine code for arguments of these kinds; None where numba itself must call it."""
         if kinds not in self._entries:
             with COMPILING:
-                self._entries[kinds] = _machine_code.entry_of(self, kinds)
+                self._entries[kinds] = entry_of(self, kinds)
         return self._entries[kinds]
 
     @functools.cached_property
@@ -62,13 +63,13 @@ class _Compiled:
     def alone(self) -> Any:
         """The same as part of machine code that needs nothing of numba."""
         without = {name: value for name, value in self.options.items() if name != "cache"}
-        return self._made(without | _machine_code.ALONE)
+        return self._made(without | _bitcode.ALONE)
 
     def _made(self, options: dict[str, Any]) -> Any:
         import numba
 
-        if self._before is not None:
-            self._before()
+        if self.before is not None:
+            self.before()
         return numba.njit(**options)(self.loop)
 
     @property
@@ -76,4 +77,4 @@ class _Compiled:
         """Numba asks for this where one loop calls another."""
         import numba
 
-        return numba.typeof(self.alone if _machine_code.compiles() else self.dispatcher)
+        return numba.typeof(self.alone if _bitcode.compiles() else self.dispatcher)

@@ -150,7 +150,8 @@ ENCODINGS = {"evt3": evt3, "mono": mono, "libcaer": libcaer, "libcaer_cmp": libc
 
 
 def _words(data: Bytes, kind: str) -> NDArray[np.unsignedinteger]:
-    return np.frombuffer(data, kind, len(data) // np.dtype(kind).itemsize)
+    words = np.frombuffer(data, kind, len(data) // np.dtype(kind).itemsize)
+    return np.require(words, requirements="A")  # as loops are compiled for
 
 
 def _ns(base_ns: int) -> int:
