@@ -63,6 +63,7 @@ def run(args: Args) -> int:
         f"  evplace localize {street} {recordings[1]}",
         f"  evplace evaluate {street} {night} -o {result}",
         f"  evplace report {result}",
+        f"  evplace play {result} {street} {recordings[1]}",
     )
     return 0
 

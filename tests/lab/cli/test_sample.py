@@ -21,10 +21,11 @@ def test_the_printed_lines_run_on_what_was_made(
     lines = [line.strip() for line in capsys.readouterr().out.splitlines() if line.startswith("  evplace")]
     names = sorted(path.name for path in (tmp_path / "street").iterdir())
     assert names == ["day.csv", "day.h5", "day.nmea", "night.csv", "night.h5", "night.nmea"]
-    assert len(lines) == 5
+    assert len(lines) == 6
     for line in lines:
         assert main(shlex.split(line)[1:]) == 0, line
     assert (tmp_path / "street.result" / "report.html").exists()
+    assert (tmp_path / "street.result" / "play.webp").exists()
     assert main(["sample", "-o", str(tmp_path / "street")]) == 2
     monkeypatch.setattr(sample, "_make", lambda folder: None)
     assert main(["sample", "-o", str(tmp_path / "street"), "--overwrite", "--json"]) == 0
