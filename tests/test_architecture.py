@@ -23,7 +23,7 @@ SRC = Path(__file__).parents[1] / "src"
 
 ORDER = {
     "evplace": (
-        "core sources imaging drives places torch searchers scorers matchers placemap _regions localizer "
+        "core sources imaging drives places torch searchers scorers matchers placemap localizer "
         "exports serving evaluation doctor testing cli"
     ),
     "evplace.core": (
@@ -38,6 +38,7 @@ ORDER = {
     "evplace.searchers": "_loops _turned exact int8 bits faiss",
     "evplace.scorers": "_reduction _compressed _indexed _distances _seqslam_images _network",
     "evplace.scorers._network": "network_onnx network augmentation checkpoint training",
+    "evplace.localizer": "_regions _drive",
     "evplace.evaluation": "truth sweeps",
     "evplace_lab": "city descriptor reproduction report demonstration benchmark cli",
 }

@@ -35,6 +35,7 @@ def plain(events: Events) -> tuple[int, int, list[list[int]]]:
 )
 @example(0, [(0, 0, 0, True), (STAMPS_US - 1, 0, 0, True), (SOON_US, 0, 0, True)], 7)
 @example(0, [(0, 0, 0, True), (STAMPS_US - 1, 0, 0, True), (SOON_US - 1, 0, 0, True)], 7)
+@example(0, [(1, 0, 1, True)] * 5000 + [(1, 1, 1, True)] * 2047, 7)
 def test_against_a_plain_loop(start_us: int, rows: list[tuple[int, int, int, bool]], packet: int) -> None:
     steps, x, y, p = (np.array(column) for column in zip(*rows, strict=True))
     events = Events.of(start_us + np.cumsum(steps), x, y, p, (2, 2))

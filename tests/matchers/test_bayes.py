@@ -14,8 +14,7 @@ from evplace.matchers import _belief as belief
 from evplace.matchers import _route_filter as loops
 from evplace.matchers import _traces as traces
 from evplace.matchers._calibration import LATE, LIVE
-from evplace.matchers._known import LONGER, joined
-from evplace.matchers._surroundings import cells
+from evplace.matchers._known import LONGER, Means, joined, of_live
 from evplace.matchers._ways import Ways
 from evplace.matchers.bayes import Bayes
 from evplace.testing import check_matcher
@@ -138,7 +137,9 @@ def test_hindsight_is_forward_and_backward_by_plain_matrices() -> None:
 
 
 def evidence(filter_: belief.Filter, row: NDArray[np.float32]) -> Floats:
-    return filter_.says[cells(traces.robust_z(row))]
+    said = np.zeros(len(row))
+    loops.weigh(np.ones((len(row), 8)), said, traces.robust_z(row), filter_.says, np.ones(360))
+    return said
 
 
 def test_a_transposed_move_undoes_no_product() -> None:
@@ -189,6 +190,30 @@ def test_images_of_any_rate_give_the_same_answers(rate: int) -> None:
     assert np.quantile(apart[60:], 0.99) <= 3
     accepted = np.array([[one.accepted, other.accepted] for one, other in zip(at_ten, faster, strict=True)])
     assert (accepted[:, 0] == accepted[:, 1]).mean() > 0.97
+
+
+def test_images_further_apart_tell_more_each() -> None:
+    """One a second must do with a tenth of the images, each of which is new."""
+    told = {}
+    for apart_s in (0.05, 0.1, 0.2, 0.6, 1.0, 30.0):
+        clock = belief.Clock()
+        told[apart_s] = [clock.see(Seen(round(at * apart_s * 1e6), 1.0))[0] for at in range(3)][-1]
+    wanted = {0.05: 0.5, 0.1: 1.0, 0.2: 1.0, 0.6: 1.25, 1.0: 1.5, 30.0: 1.5}
+    assert told == pytest.approx(wanted)
+
+
+def test_where_images_are_a_second_apart_a_drive_is_found_in_a_few() -> None:
+    """What is read of an answer is averaged over images, of which each counts for one."""
+    route = calibrated(road())
+    on = np.arange(20, 180, 5.0)
+    answers = drive(Bayes(), route, rows_along(route, on), at_rate(len(on), 1))
+    sure = [one.accepted for one in answers]
+    assert sure.index(True) < 8
+    assert all(abs(one.item - at) <= 3 for one, at in zip(answers, on, strict=True) if one.accepted)
+    signs, weights = np.random.default_rng(0).normal(size=(20, 4)), np.full(20, 2.0)
+    running, once = Means(), of_live(signs, np.ones(20))
+    assert np.allclose([running.add(one, 2.0) for one in signs], once)
+    assert np.allclose(of_live(signs, weights), once)
 
 
 def test_a_camera_that_stands_says_nothing_new() -> None:

@@ -57,12 +57,13 @@ def test_what_an_image_says_counts_as_plainly() -> None:
     z = RNG.normal(0, 3, 300).astype(np.float32)
     table, weight = around.evidence(around.USUAL), 0.7
     before, evidence = RNG.random((300, len(belief.SPEEDS))), RNG.random(300)
-    says = weight * table[around.cells(z)]
+    nearest = np.clip((z - np.float32(around.GRID[0])) * np.float32(20) + np.float32(0.5), 0, 359)
+    says = weight * table[nearest.astype(np.int32)]
     plain = before * np.exp(says)[:, None]
     plain /= plain.sum()
     found, told, marginal = before.copy(), evidence.copy(), np.empty(300)
-    loops.weigh(found, told, around.cells(z), weight * table, np.exp(weight * table))
-    loops.share_out(found, found.sum(), marginal)
+    loops.weigh(found, told, z, weight * table, np.exp(weight * table))
+    loops.share_out(found.reshape(-1), found.sum(), marginal)
     np.testing.assert_array_equal(found, plain)
     np.testing.assert_array_equal(told, evidence + says)
     np.testing.assert_array_equal(marginal, plain.sum(axis=1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,6 +62,13 @@ def write_drives(folder: Path) -> None:
     (folder / "table.txt").write_text("1 2 3 1\n5 4 4 0\n")
     (folder / "letter.txt").write_text("Dear reader,\n")
     write_brisbane(folder / "brisbane")
+
+
+def write_city(folder: Path, day: Path, night: Path) -> None:
+    """What `evplace city` leaves, of two traverses."""
+    for drive, traverse in (("day-1", day), ("night-1", night)):
+        shutil.copytree(traverse, folder / drive / "ideal")
+    (folder / "city.json").write_text("{}")
 
 
 def write_sample(folder: Path) -> None:

@@ -47,13 +47,23 @@ def test_images_of_any_size_are_described(shape: tuple[int, int]) -> None:
     assert np.linalg.norm(vectors, axis=1).max() <= 1 + 1e-5
 
 
+def test_an_image_of_few_pixels_keeps_all_it_has() -> None:
+    """Two pixels beside one another stay two: smoothed, they would be much alike."""
+    few = np.zeros((2, 8, 8), np.uint8)
+    few[0, 4, 3] = few[1, 4, 4] = 200
+    many = np.zeros((2, 32, 32), np.uint8)
+    many[0, 16, 15] = many[1, 16, 16] = 200
+    alike = [float(vectors[0] @ vectors[1]) for vectors in (Edges().describe(few), Edges().describe(many))]
+    assert alike[0] < 0.3 < 0.5 < alike[1]
+
+
 def test_directions_are_those_of_the_edges() -> None:
     """Upright stripes have their edges in the first bin, lying ones in the middle."""
     upright = np.tile((np.arange(80) // 5 % 2 * 100).astype(np.uint8), (45, 1))
     part = Edges()
     for image, bin_ in ((upright, 0), (np.ascontiguousarray(upright.T[:45, :45]), 3)):
         values = np.sqrt(image[None].astype(np.float32) / 255)
-        histogram = part._directions(values) + 1e-3
+        histogram = part._directions(values, part.cell) + 1e-3
         spread = histogram.std(axis=(2, 3))[0]
         assert spread.argmax() == bin_
 
@@ -72,7 +82,7 @@ def test_the_histogram_is_that_of_a_plain_loop() -> None:
             plain[low, y // 3, x // 4] += length * (1 - share) / 12
             plain[(low + 1) % 6, y // 3, x // 4] += length * share / 12
     strength = np.sqrt((plain**2).sum(0))
-    found = part._directions(values)[0]
+    found = part._directions(values, part.cell)[0]
     from evplace.scorers._reduction import blurred
 
     smooth = blurred(strength[None].astype(np.float32), 1.0)[0]
@@ -93,9 +103,11 @@ def test_directions_are_shared_as_by_a_remainder(orientations: int) -> None:
     at = rng.uniform(-orientations, orientations, (2, 9, 9)).astype(np.float32)
     at[0, 0] = np.linspace(-orientations, orientations, 9)
     half, turn = np.float32(orientations / 2), np.float32(orientations)
-    for bin_, found in enumerate(edges._shares(at, orientations).swapaxes(0, 1)):
+    length, shares = rng.random(at.shape).astype(np.float32), np.empty((2, orientations, 9, 9), np.float32)
+    edges._share_out(at, length, shares)
+    for bin_, found in enumerate(shares.swapaxes(0, 1)):
         away = np.abs(np.mod(at - np.float32(bin_) + half, turn) - half)
-        np.testing.assert_array_equal(found, np.maximum(1 - away, 0))
+        np.testing.assert_array_equal(found, length * np.maximum(1 - away, 0))
 
 
 def test_slopes_are_numpys() -> None:

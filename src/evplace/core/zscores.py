@@ -31,10 +31,10 @@ def z_by(usual: NDArray[np.floating[Any]], scores: NDArray[np.floating[Any]]) ->
 def scale_of(some: NDArray[np.float32]) -> tuple[np.float32, float]:
     """The median of scores and half their 16 to 84 % range, which is 0 where all are alike."""
     low, middle, high = (int(share * (len(some) - 1)) for share in (0.16, 0.5, 0.84))
-    sorted_there = np.partition(some, sorted({low, middle, high}))
-    spread = float(sorted_there[high] - sorted_there[low]) / 2
-    alike = spread <= 1e-6 * float(np.abs(sorted_there[[low, middle, high]]).max())
-    return sorted_there[middle], 0.0 if alike else spread
+    lowest, usual, highest = np.sort(some)[[low, middle, high]]  # many times as fast as a partition
+    spread = float(highest - lowest) / 2
+    alike = spread <= 1e-6 * float(max(abs(lowest), abs(usual), abs(highest)))
+    return usual, 0.0 if alike else spread
 
 
 def ordered(items: int) -> slice:

@@ -22,13 +22,17 @@ _LONGEST = 1 << 23
 """Bins that are laid out at most, nine days: a clock that leaps a year ahead must not cost all memory."""
 SOON_US = 1000
 """A pixel whose last event is less than so long ago repeats itself."""
-STAMP_BITS = 32
-"""A pixel is one number, its count above so many bits of its last time: what is far apart in memory costs
-more than all else."""
-STAMPS_US = 1 << 30
+STAMP_BITS = 21
+"""A pixel is one number of 32 bits, its count above so many bits of its last time: what is far apart in
+memory costs more than all else."""
+COUNTED = 1 << 32 - STAMP_BITS
+"""Events that no longer fit beside the time are counted elsewhere."""
+AGO_US = 1 << 10
+"""Times are known up to so long before stamps begin anew."""
+STAMPS_US = (1 << STAMP_BITS - 1) - AGO_US
 """After so long stamps begin anew."""
-AGO_US = 1 << 20
-"""Times are known up to so long before that."""
+BLOCK = 128
+"""Events whose pixels are looked up together."""
 REACH_US = 500_000
 """Activity is averaged over so long before and after."""
 
@@ -98,13 +102,15 @@ class Subject:
     """For a film: the time between two frames, and the image's motion in pixels a second."""
 
     def __post_init__(self) -> None:
-        self._pixels = np.zeros((self.size[1], self.size[0]), np.int64)
-        self._begin = np.full(1, -1 << 62)
+        self._pixels = np.zeros(self.size[0] * self.size[1], np.uint32)
+        self._more = np.zeros(len(self._pixels), np.int64)
+        self._begin, self._block = np.full(1, -1 << 62), np.empty((2, BLOCK), np.uint64)
 
     @property
     def counts(self) -> NDArray[np.int64]:
         """(H, W) events of each pixel."""
-        return self._pixels >> STAMP_BITS
+        counts = self._more + (self._pixels >> STAMP_BITS)
+        return counts.reshape(self.size[1], self.size[0])
 
     @property
     def span_s(self) -> float:
@@ -117,7 +123,10 @@ class Subject:
         self.rates.push(events.t_us)
         self.silences.push(events.t_us)
         found = np.zeros(2, np.int64)
-        _see_pixels(events.t_us, events.x, events.y, events.p, self._pixels, self._begin, found)
+        _see_pixels(
+            events.t_us, events.x, events.y, events.p, self.size[0], self._pixels, self._more, self._begin,
+            self._block, found,
+        )  # fmt: skip
         self.twice, self.soon = self.twice + int(found[0]), self.soon + int(found[1])
 
     def see_frame(self, t_us: int) -> None:
@@ -216,35 +225,47 @@ def _see_pixels(
     x: NDArray[np.uint16],
     y: NDArray[np.uint16],
     p: NDArray[np.bool_],
-    pixels: NDArray[np.int64],
+    width: int,
+    pixels: NDArray[np.uint32],
+    more: NDArray[np.int64],
     begin: NDArray[np.int64],
+    block: NDArray[np.uint64],
     found: NDArray[np.int64],
 ) -> None:
     """Count each pixel's events, and add to `found` those that come twice, and soon.
 
     A pixel's stamp is its last time since begin[0] - AGO_US, doubled, and one more where it became brighter;
-    0 where that was earlier.
+    0 where that was earlier. Whole counts go to `more`. The pixels of a block of events are looked up before
+    the first of them changes, so that the waits for memory overlap; `block` is room for that.
     """
-    for i in range(len(t_us)):
-        since = t_us[i] - begin[0]
-        if since >= STAMPS_US:
-            _stamp_anew(pixels, since)
-            begin[0], since = t_us[i], 0
-        now = since + AGO_US << 1 | np.int64(p[i])
-        pixel = pixels[y[i], x[i]]
-        before = pixel & (1 << STAMP_BITS) - 1
-        pixels[y[i], x[i]] = pixel - before + (1 << STAMP_BITS) + now
-        if now == before:
-            found[0] += 1
-        elif (now >> 1) - (before >> 1) < SOON_US:
-            found[1] += 1
+    for first in range(0, len(t_us), BLOCK):
+        many = min(BLOCK, len(t_us) - first)
+        for k in range(many):
+            block[0, k] = np.uint64(y[first + k]) * np.uint64(width) + np.uint64(x[first + k])
+            block[1, k] = pixels[block[0, k]]
+        for k in range(many):
+            i, at = first + k, block[0, k]
+            since = t_us[i] - begin[0]
+            if since >= STAMPS_US:
+                _stamp_anew(pixels, since)
+                begin[0], since = t_us[i], 0
+            now = since + AGO_US << 1 | np.int64(p[i])
+            pixel = np.int64(pixels[at])
+            before = pixel & (1 << STAMP_BITS) - 1
+            after = pixel - before + (1 << STAMP_BITS) + now
+            pixels[at] = np.uint32(after)
+            if after >= 1 << 32:
+                more[at] += COUNTED
+            if now == before:
+                found[0] += 1
+            elif (now >> 1) - (before >> 1) < SOON_US:
+                found[1] += 1
 
 
 @njit(cache=True)
-def _stamp_anew(pixels: NDArray[np.int64], later_us: int) -> None:
+def _stamp_anew(pixels: NDArray[np.uint32], later_us: int) -> None:
     """Stamps count from so much later."""
-    for row in range(pixels.shape[0]):
-        for column in range(pixels.shape[1]):
-            stamp = pixels[row, column] & (1 << STAMP_BITS) - 1
-            new = stamp - (later_us << 1) if stamp >> 1 > later_us else 0
-            pixels[row, column] += new - stamp
+    stamps, later = np.uint32((1 << STAMP_BITS) - 1), np.uint32(min(later_us << 1, 1 << STAMP_BITS))
+    for at in range(len(pixels)):
+        stamp = pixels[at] & stamps
+        pixels[at] -= later if stamp > later | np.uint32(1) else stamp

@@ -18,7 +18,8 @@ from evplace.evaluation._checkpoint import Checkpoint
 from evplace.evaluation._measures import Floats
 from evplace.evaluation.truth import Truth, by_cells, by_places, by_radius, only_views
 from evplace.imaging.traverse import Traverse
-from evplace.localizer import Answering, Answers, Localizer
+from evplace.localizer import Localizer
+from evplace.localizer._drive import Answering, Answers
 from evplace.matchers import Path
 from evplace.placemap import PlaceMap
 from evplace.places import PlaceGrid, PlaceRuns

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from evplace.core import settings
-from evplace.localizer import BLOCK, Answers
+from evplace.localizer._drive import BLOCK, Answers
 from evplace.matchers import Judge, Matcher, Path, Rows, stepped
 
 

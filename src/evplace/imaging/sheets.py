@@ -1,7 +1,8 @@
-"""Contact sheets: some images of a traverse at a glance."""
+"""Pictures of several images: contact sheets, images side by side, films."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,12 @@ from numpy.typing import NDArray
 from evplace.core.storage import new_file
 
 GAP = 4
-"""Grey pixels between two images."""
+"""Pixels between two images."""
+FILMS = (".webp", ".gif")
+"""How the name of a film ends."""
+
+Picture = NDArray[np.uint8]
+"""(h, w, 3)."""
 
 
 def contact_sheet(
@@ -29,17 +35,37 @@ def contact_sheet(
 
     chosen = images[np.linspace(0, len(images) - 1, min(len(images), columns * rows)).astype(int)]
     tiles = [_tile(image, events) for image in chosen]
-    height, width = tiles[0].shape[:2]
-    n_rows = -(-len(tiles) // columns)
-    sheet = np.full((n_rows * (height + GAP) - GAP, columns * (width + GAP) - GAP, 3), 200, np.uint8)
-    for index, tile in enumerate(tiles):
-        top, left = index // columns * (height + GAP), index % columns * (width + GAP)
-        sheet[top : top + height, left : left + width] = tile
+    sheet = stacked([tiles[at : at + columns] for at in range(0, len(tiles), columns)], 200)
     with new_file(path, overwrite) as partial:
         Image.fromarray(sheet).save(partial, "PNG")
 
 
-def as_shown(image: NDArray[np.uint8], events: bool) -> NDArray[np.uint8]:
+def stacked(rows: Sequence[Sequence[Picture]], grey: int = 255) -> Picture:
+    """Pictures of one size side by side, rows below each other, with gaps of a grey; rows may be shorter."""
+    height, width = rows[0][0].shape[:2]
+    columns = max(map(len, rows))
+    sheet = np.full((len(rows) * (height + GAP) - GAP, columns * (width + GAP) - GAP, 3), grey, np.uint8)
+    for j, row in enumerate(rows):
+        for i, picture in enumerate(row):
+            y, x = j * (height + GAP), i * (width + GAP)
+            sheet[y : y + height, x : x + width] = picture
+    return sheet
+
+
+def write_film(pictures: Sequence[Picture], path: str | Path, fps: int, overwrite: bool = False) -> None:
+    """Write pictures of one size as a film that goes round, by the end of its name one of FILMS.
+
+    Raises OutputError where it exists (unless `overwrite`) or cannot be written.
+    """
+    from PIL import Image
+
+    first, *others = map(Image.fromarray, pictures)
+    with new_file(path, overwrite) as partial:
+        pause = round(1000 / fps)
+        first.save(partial, save_all=True, append_images=others, duration=pause, loop=0, quality=50)
+
+
+def as_shown(image: NDArray[np.uint8], events: bool) -> Picture:
     """An image (h, w) or (h, w, C) as (h, w, 3); an event image as ink on paper, a camera's as it is."""
     if image.ndim == 3 and image.shape[2] == 3:
         return image
@@ -47,7 +73,7 @@ def as_shown(image: NDArray[np.uint8], events: bool) -> NDArray[np.uint8]:
     return np.repeat((255 - strongest if events else strongest)[..., None], 3, axis=2)
 
 
-def _tile(image: NDArray[np.uint8], events: bool) -> NDArray[np.uint8]:
+def _tile(image: NDArray[np.uint8], events: bool) -> Picture:
     """An image as it is shown, at least 160 pixels wide."""
     shown = as_shown(image, events)
     zoom = max(1, 160 // shown.shape[1])

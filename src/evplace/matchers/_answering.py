@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.matchers import _nearby as nearby
 from evplace.matchers import _route_filter as loops
 from evplace.matchers._belief import reaches
 from evplace.matchers._known import SIGNS, signs_of
@@ -38,6 +39,15 @@ class Found(NamedTuple):
     """(SIGNS,) see `_known`."""
 
 
+class Others(NamedTuple):
+    """Runners-up to an answer."""
+
+    items: tuple[int, ...]
+    """Best first."""
+    mass: float
+    """Belief around the first; 0 where there is none."""
+
+
 class Reader:
     """Reads beliefs over the items of a map."""
 
@@ -47,6 +57,8 @@ class Reader:
         self._more = 1 + left_out / len(ways.way)
         self._reach = reaches(ways)
         self._read = np.empty(SIGNS)
+        self._held, self._away = np.empty(len(ways.way), np.int64), np.empty(len(ways.way))
+        self._bins = np.empty(nearby.BINS)
 
     def find(self, belief: Floats, z: NDArray[np.float32]) -> Found:
         """The item in the middle of the likeliest stretch."""
@@ -63,29 +75,20 @@ class Reader:
         """
         if not self.ways.in_metres:
             return math.nan
-        held = np.flatnonzero(belief > HELD)
-        if not len(held):
+        xy = self.ways.xy
+        last = nearby.farthest(belief, xy, item, HELD, LIKELY, self._held, self._away, self._bins)
+        if last < 0:
             return math.nan
-        away = np.hypot(*(self.ways.xy[held] - self.ways.xy[item]).T)
-        order = np.argsort(away)
-        share = np.cumsum(belief[held[order]])
-        radius = float(away[order[np.searchsorted(share, LIKELY * share[-1])]])
-        return max(radius, self.ways.spacing / 2)
+        return max(float(np.hypot(*(xy[last] - xy[item]))), self.ways.spacing / 2)
 
-    def others(self, belief: Floats, item: int) -> list[tuple[int, float]]:
-        """The next best items at other places, and the belief around each."""
-        held = np.flatnonzero(belief > max(HELD, NOTABLE * float(belief.max())))
-        xy, left = self.ways.xy[held], belief[held]
-        found: list[tuple[int, float]] = []
-        here = self.ways.xy[item]
-        for _ in range(OTHERS):
-            left[np.hypot(*(xy - here).T) <= self._reach[3]] = 0.0
-            if not left.any():
-                break
-            best = int(left.argmax())
-            here = xy[best]
-            found.append((int(held[best]), float(left[np.hypot(*(xy - here).T) <= self._reach[0]].sum())))
-        return found
+    def others(self, belief: Floats, item: int) -> Others:
+        """The next best items at other places."""
+        least = max(HELD, NOTABLE * float(belief.max()))
+        found, mass = np.empty(OTHERS, np.int64), np.empty(1)
+        many = nearby.runners_up(
+            belief, self.ways.xy, item, least, self._reach[[0, 3]], self._held, found, mass
+        )
+        return Others(tuple(found[:many].tolist()), float(mass[0]))
 
 
 def _among(more: float, read: Floats) -> None:

@@ -1,8 +1,8 @@
 """Where on the map: a causal Bayes filter over references and classes of speed, and what was seen on the way.
 
 A score row enters as a z-score; how much that speaks for a reference is told by what other places score, as
-measured on the map itself. History is in seconds: an image counts by the time since the last one, up to ten a
-second, and by how much it shows, since a camera that stands learns nothing new.
+measured on the map itself. History is in seconds: an image counts by the time since the last one, and by how
+much it shows, since a camera that stands learns nothing new.
 """
 
 from __future__ import annotations
@@ -27,6 +27,11 @@ SPEEDS = np.array([0.25, 0.4, 0.6, 0.8, 1.0, 1.4, 2.0, 3.0])
 """Classes of speed, as shares of the map's own."""
 TICK_S = 0.1
 """Images that come faster count less each; the filter moves on about so often."""
+MORE_NEW_S = (0.2, 1.0)
+"""Images further apart than the first are less alike and count more, up to MOST_NEW from the second on."""
+MOST_NEW = 1.5
+"""How much an image may count, against one a tenth of a second after the last (ours: towns for tuning alone
+would have it 2, but images of real drives are more alike)."""
 MOVING_S = 0.8 * TICK_S
 """The filter moves once this much has been driven: never by steps much smaller than a reference."""
 REMEMBERED = 300
@@ -75,11 +80,11 @@ class Filter:
         self.evidence, self.moved_s = np.zeros(len(self.evidence)), seconds
 
     def see(self, z: NDArray[np.float32], weight: float) -> Floats:
-        """(references,) the belief after one more row of z-scores; `weight` from 0 to 1."""
+        """(references,) the belief after one more row of z-scores of an image of some weight."""
         says = weight * self.says
-        loops.weigh(self.belief, self.evidence, around.cells(z), says, np.exp(says))
+        loops.weigh(self.belief, self.evidence, z, says, np.exp(says))
         marginal = np.empty(len(self.belief))
-        loops.share_out(self.belief, self.belief.sum(), marginal)
+        loops.share_out(self.belief.reshape(-1), self.belief.sum(), marginal)
         return marginal
 
     def go_on(self, before: Filter, came_from: NDArray[np.int64]) -> None:
@@ -167,9 +172,9 @@ class Clock:
         self._shown: deque[float] = deque([] if math.isnan(usual) else [usual] * BELIEVED, maxlen=REMEMBERED)
 
     def see(self, seen: Seen) -> tuple[float, float | None]:
-        """The weight of an image, 0 to 1, and the seconds driven where the filter is to move before it."""
+        """The weight of an image, and the seconds driven where the filter is to move before it."""
         seconds = 0.0 if self._last_us is None else max(seen.t_us - self._last_us, 0) * 1e-6
-        new = 1.0 if self._last_us is None else min(seconds / TICK_S, 1.0)
+        new = 1.0 if self._last_us is None else _new(seconds)
         self._last_us = seen.t_us
         active = self._active(seen.content, seconds)
         self.standing = active == 0.0
@@ -193,6 +198,13 @@ class Clock:
             self._shown.append(content)
             self._since_kept_s = 0.0
         return active
+
+
+def _new(seconds: float) -> float:
+    """How much an image shows that the last one, so many seconds ago, did not."""
+    begin, end = MORE_NEW_S
+    more = min(max((seconds - begin) / (end - begin), 0.0), 1.0)
+    return min(seconds / TICK_S, 1.0 + (MOST_NEW - 1.0) * more)
 
 
 def _median(values: deque[float]) -> float:

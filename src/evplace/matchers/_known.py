@@ -20,7 +20,8 @@ Floats = NDArray[np.float64]
 
 SIGNS = 4
 SPANS = np.array([1e-3, 4.0, 12.0])
-"""Over how many images, at ten a second and while the camera moves, each sign is averaged."""
+"""Over how many images, at ten a second and while the camera moves, each sign is averaged; an image counts
+for one at most, however long ago the last one was."""
 LONGER = np.array([sign * len(SPANS) + span for sign in range(SIGNS) for span in range(1, len(SPANS))])
 """Where the means over the longer spans stand."""
 LEAST_AHEAD = 0.5
@@ -49,6 +50,7 @@ class Means:
 
     def add(self, signs: Floats, weight: float) -> Floats:
         """(SIGNS * SPANS,) the means with one more image; one that says nothing changes nothing."""
+        weight = min(weight, 1.0)
         keep = np.exp(-weight / SPANS)
         self._sums = self._sums * keep + signs[:, None] * weight
         self._weights = self._weights * keep + weight + 1e-9
@@ -62,11 +64,12 @@ def means_of(signs: Floats, weights: Floats, spans: Floats) -> Floats:
     out = np.empty((n, many * len(spans)))
     sums, total = np.zeros((many, len(spans))), np.zeros(len(spans))
     for i in range(n):
+        weight = min(weights[i], 1.0)
         for s in range(len(spans)):
-            keep = np.exp(-weights[i] / spans[s])
-            total[s] = total[s] * keep + weights[i] + 1e-9
+            keep = np.exp(-weight / spans[s])
+            total[s] = total[s] * keep + weight + 1e-9
             for k in range(many):
-                sums[k, s] = sums[k, s] * keep + signs[i, k] * weights[i]
+                sums[k, s] = sums[k, s] * keep + signs[i, k] * weight
                 out[i, k * len(spans) + s] = sums[k, s] / total[s]
     return out
 

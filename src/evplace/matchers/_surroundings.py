@@ -52,9 +52,3 @@ def evidence(wrong: Floats) -> Floats:
     clamped = np.where(np.arange(len(GRID)) < int(wrong.argmax()), wrong.max(), wrong)
     ratio = TRUST * (-np.log(TOP) - np.maximum(clamped, -60.0))
     return np.asarray(np.log((1 - OUTLIERS) * np.exp(np.minimum(ratio, 40.0)) + OUTLIERS), np.float64)
-
-
-def cells(z: NDArray[np.float32]) -> NDArray[np.int32]:
-    """(items,) where in GRID z-scores are: the nearest one."""
-    at = np.clip((z - np.float32(GRID[0])) * np.float32(1 / STEP) + np.float32(0.5), 0, len(GRID) - 1)
-    return np.asarray(at, np.int32)

@@ -245,10 +245,10 @@ def _answer(
     accepted = right > by._threshold
     others = by._reader.others(belief, found.item)
     estimate = Estimate(
-        _state(right, by._threshold, standing, found.mass, others[0][1] if others else 0.0),
+        _state(right, by._threshold, standing, found.mass, others.mass),
         right if by._measured else math.nan,
         by._reader.uncertainty_m(belief, found.item),
-        tuple(item for item, _ in others),
+        others.items,
     )
     return Answer(query, found.item, right, accepted, estimate)
 

@@ -2,7 +2,7 @@
 
 An image is averaged with the one a tenth of a second before it, and the map keeps a reference a metre. What
 each part scores becomes z-scores, which mean the same whatever its scale, and these are added, those of the
-trained descriptor twice.
+trained descriptor twice, where images have the pixels for it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from evplace.scorers import (
 )
 from evplace.scorers._compressed import Compressed, compress
 from evplace.scorers._indexed import IndexedRows, indexed, scale
-from evplace.scorers.edges import Edges
+from evplace.scorers.edges import FEW_PIXELS, Edges
 from evplace.scorers.trained import Trained
 from evplace.searchers import ABOUT, usual
 
@@ -46,7 +46,9 @@ VERSIONS = "descriptors.json"
 WEIGHTS = {"edges": 1.0, "trained": 2.0}
 """How much the z-scores of each part count: on towns for tuning, in halls and on LENS's example better than
 alike, or about as good (ours)."""
-EDGES_VERSION = "1"
+EVEN_WEIGHTS = {"edges": 1.0, "trained": 1.0}
+"""The same for images of few pixels, which are not what the network was trained on (ours)."""
+EDGES_VERSION = "2"
 """Vectors of another version of `Edges` cannot be compared with these."""
 STANDING = 0.5
 """Without positions, images that show less than this share of the usual are left out: the camera stood."""
@@ -95,7 +97,7 @@ class Fused:
             many = self.components if name == "edges" else self.components // 2
             found[name] = compress(in_blocks(part.describe, references), many)
         index = self.index or usual(len(kept))
-        content |= _side_by_side(found) if index == "exact" else indexed(found, WEIGHTS, index)
+        content |= _side_by_side(found) if index == "exact" else indexed(found, _weights(references), index)
         content[VERSIONS] = json.dumps(_versions(self), indent=1).encode()
         return Learned(content, kept)
 
@@ -114,11 +116,13 @@ class Fused:
         references = references_of(content)
         items = len(references)
         _check_versions(content, _versions(self))
-        used = parts or self.parts
+        used, weights = parts or self.parts, _weights(references)
         opened: IndexedRows | _FusedRows = (
-            IndexedRows(used, WEIGHTS, content, items)
+            IndexedRows(used, weights, content, items)
             if ABOUT in content
-            else _FusedRows([(name, part, _read(content, name, items)) for name, part in used.items()])
+            else _FusedRows(
+                [(weights[name], part, _read(content, name, items)) for name, part in used.items()]
+            )
         )
         try:
             opened.some(np.asarray(references[:1]), np.zeros(1, np.int64))
@@ -133,7 +137,8 @@ Fused.presets = {"best": Fused()}
 class _FusedRows:
     distances = False
 
-    def __init__(self, parts: list[tuple[str, Descriptor, Compressed]]) -> None:
+    def __init__(self, parts: list[tuple[float, Descriptor, Compressed]]) -> None:
+        """Each part with its weight and its vectors."""
         self._parts = parts
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
@@ -146,14 +151,14 @@ class _FusedRows:
     def _row(self, image: NDArray[np.uint8]) -> Rows:
         """(1, items): image by image, so that a row does not depend on what else is asked."""
         scores = [
-            WEIGHTS[name] * robust_z(searched.rows(part.describe(image))[0])
-            for name, part, searched in self._parts
+            weight * robust_z(searched.rows(part.describe(image))[0])
+            for weight, part, searched in self._parts
         ]
         return robust_z(np.sum(scores, axis=0))[None]
 
     def _some(self, image: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
         """(1, len(items)): what is usual is told by those that tell it of a whole row."""
-        weights = [WEIGHTS[name] for name, _, _ in self._parts]
+        weights = [weight for weight, _, _ in self._parts]
         described = [part.describe(image) @ searched.basis for _, part, searched in self._parts]
         held = [searched.vectors for _, _, searched in self._parts]
         usual = [one.dot(all_.T[:, ordered(len(all_))])[0] for one, all_ in zip(described, held, strict=True)]
@@ -163,6 +168,11 @@ class _FusedRows:
             for factor, one, all_ in zip(by.factors, described, held, strict=True)
         ]
         return np.asarray(np.sum(scores, axis=0) - np.float32(by.shift), np.float32)
+
+
+def _weights(images: NDArray[np.uint8]) -> Mapping[str, float]:
+    """What each part counts for images (n, h, w, ...) of this size."""
+    return EVEN_WEIGHTS if images.shape[1] * images.shape[2] < FEW_PIXELS else WEIGHTS
 
 
 def _side_by_side(found: Mapping[str, Compressed]) -> dict[str, NDArray[np.float32]]:

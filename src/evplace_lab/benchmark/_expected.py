@@ -1,10 +1,9 @@
-"""What evplace itself was found to do on the frozen city, and where a run finds something else."""
+"""What evplace itself was found to do on the frozen city, and how a run stands against it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from evplace.core import settings
 from evplace.core.folders import CITY
@@ -20,18 +19,29 @@ def expected() -> dict[str, Any]:
     return settings.from_toml(FILE)
 
 
-def deviations(document: dict[str, Any], city: Path) -> Iterator[str]:
-    """A sentence for each figure of ours that is another than was found before; none of another city."""
-    known = expected()
-    if document["rule"] != known["rule"] or not _is_frozen(city, known["city"]):
-        return
-    for row in document["rows"]:
-        wanted = known.get(document["input"], {}).get(row["query"], {})
-        for name in wanted if row["method"] == METHOD else ():
-            found = 100 * row[name]
-            if abs(found - wanted[name]) > known["tolerance"]:
-                before = f"evplace {known['evplace']} was found to have {wanted[name]:.1f} %"
-                yield f"{row['query']}: {name} of '{METHOD}' is {found:.1f} %, where {before}"
+class Held(NamedTuple):
+    """How the figures of a run stand against those that were found before."""
+
+    alike: int
+    """How many are as before."""
+    others: list[str]
+    """A sentence for each that is not."""
+
+
+def held(document: dict[str, Any], city: Path) -> Held:
+    """The figures of ours against those that were found before; none of another city, or by another rule."""
+    known, compared = expected(), []
+    if document["rule"] == known["rule"] and _is_frozen(city, known["city"]):
+        for row in (row for row in document["rows"] if row["method"] == METHOD):
+            wanted = known.get(document["input"], {}).get(row["query"], {})
+            compared += [(row["query"], name, 100 * row[name], wanted[name]) for name in wanted]
+    others = [
+        f"{query}: {name} of '{METHOD}' is {found:.1f} %, where evplace {known['evplace']} was found to have "
+        f"{before:.1f} %"
+        for query, name, found, before in compared
+        if abs(found - before) > known["tolerance"]
+    ]
+    return Held(len(compared) - len(others), others)
 
 
 def _is_frozen(city: Path, version: str) -> bool:

@@ -21,11 +21,12 @@ def page(document: Mapping[str, Any], path: Path) -> Path:
     """Write the page of a document of `robustness`; one that is there is replaced."""
     panels = [_panel(recipe, document["rows"]) for recipe in document["recipes"]]
     title = "What is lost when a drive is worse"
+    chance = next(row["chance"] for row in document["rows"])
     about = (
         "The map is a street of the virtual city by day, the query the same street at night by the ideal "
         "sensor. Shown is the share of images that are answered rightly, live: in the right cell of 20 m or "
-        "beside it, where the map has a view within 20 m and 34 degrees. Dashed is the clean case; what is "
-        "not answered counts as wrong."
+        "beside it, where the map has a view within 20 m and 34 degrees. Dashed is the clean case. What is "
+        f"rejected counts as not right; an answer drawn at random would be right in {100 * chance:.0f} %."
     )
     (table,) = tables(dict(document))
     figures = tag("div", _table(table.columns, table.rows), class_="scroll")
@@ -99,5 +100,11 @@ def _apart(at: Any, one: float, other: float) -> bool:
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Html:
-    head = tag("tr", *(tag("th", NAMES.get(name, name)) for name in columns))
+    head = tag("tr", *(tag("th", _named(name)) for name in columns))
     return tag("table", head, *(tag("tr", *(tag("td", cell) for cell in row)) for row in rows))
+
+
+def _named(column: str) -> str:
+    """Methods by their names for people."""
+    first, *others = column.split(" ")
+    return " ".join([NAMES.get(first, first), *others])

@@ -133,7 +133,7 @@ def _rows(out: Path, recipe: Recipe) -> Iterator[dict[str, Any]]:
 
 
 def tables(document: dict[str, Any]) -> Iterator[Table]:
-    """The accuracy of the clean case, and what each level costs in points."""
+    """The accuracy of the clean case, what each level costs in points, and how much of it evplace rejects."""
     rows = {(row["kind"], row["level"], row["method"]): row for row in document["rows"]}
     lines = []
     for recipe in document["recipes"]:
@@ -141,13 +141,15 @@ def tables(document: dict[str, Any]) -> Iterator[Table]:
             is_clean = level == recipe["clean"]
             shown = [_cell(rows.get((recipe["kind"], level, method)), is_clean) for method in METHODS]
             name = f"{recipe['title']}, {recipe['unit']}"
-            lines.append([name, f"{level:g}" + (" (clean)" if is_clean else ""), *shown])
-    columns = ["what is worse", "level", *METHODS]
+            rejected = f"{100 * rows[recipe['kind'], level, METHODS[0]]['rejection_rate']:.1f}"
+            lines.append([name, f"{level:g}" + (" (clean)" if is_clean else ""), *shown, rejected])
+    columns = ["what is worse", "level", *METHODS, f"{METHODS[0]} rejects"]
     yield Table("Accuracy in %, and points against the clean case", columns, lines)
 
 
 def _cell(row: dict[str, Any] | None, is_clean: bool) -> str:
     if row is None:
         return "-"
-    beside = "" if is_clean else f" ({-100 * row['lost']:+.1f})"
+    points = round(-100 * row["lost"], 1) + 0.0  # no -0.0
+    beside = "" if is_clean else f" ({points:+.1f})"
     return f"{100 * row['accuracy']:.1f}{beside}"

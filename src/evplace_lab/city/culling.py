@@ -10,34 +10,52 @@ from numpy.typing import NDArray
 
 from evplace_lab.city.jit import compiled
 from evplace_lab.city.mesh import SPHERE, Primitives
-from evplace_lab.city.raster import FAR_M, View
+from evplace_lab.city.raster import (
+    FAR_M,
+    Buffers,
+    View,
+    clear,
+    draw,
+    find_owners,
+    is_hidden,
+    on_image,
+    turned,
+)
 
 CELL_M = 12.0
 
 
 class Groups(NamedTuple):
-    """Neighbouring primitives."""
+    """Neighbouring primitives, and as the last group those that move."""
 
     ball: NDArray[np.float64]
     """(G, 4) centre and radius of a sphere around each group."""
     start: NDArray[np.int32]
-    """(G + 1,) where each group begins in `members`."""
+    """(G + 1,) where each group begins in `members`; the last group ends where a frame's primitives end."""
     members: NDArray[np.int32]
     """(N,) primitives, group by group."""
 
 
-def group(parts: Primitives) -> Groups:
-    """Primitives whose middles lie in one square of 12 m make a group."""
+def group(parts: Primitives, moving: int = 0) -> Groups:
+    """Primitives whose middles lie in one square of 12 m make a group; up to `moving` more, which come
+    behind them, may be anywhere.
+    """
     low, high = _extent(parts)
     cell = np.floor((low + high)[:, :2] / 2 / CELL_M).astype(np.int64)
     key = cell[:, 0] * 100_000 + cell[:, 1]
-    members = np.argsort(key, kind="stable").astype(np.int32)
-    start = np.flatnonzero(np.diff(key[members], prepend=key[members[0]] - 1))
-    lowest = np.minimum.reduceat(low[members], start)
-    highest = np.maximum.reduceat(high[members], start)
+    order = np.argsort(key, kind="stable")
+    _, start = np.unique(key[order], return_index=True)
+    lowest = np.minimum.reduceat(low[order], start)
+    highest = np.maximum.reduceat(high[order], start)
     radius = np.linalg.norm(highest - lowest, axis=1) / 2
     ball = np.column_stack([(lowest + highest) / 2, radius])
-    return Groups(ball, np.append(start, len(members)).astype(np.int32), members)
+    count = len(order)
+    members = np.append(order, np.arange(count, count + moving)).astype(np.int32)
+    return Groups(
+        np.append(ball, [[0.0, 0.0, 0.0, math.inf]], axis=0),
+        np.append(start, [count, count]).astype(np.int32),
+        members,
+    )
 
 
 def _extent(parts: Primitives) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -51,22 +69,73 @@ def _extent(parts: Primitives) -> tuple[NDArray[np.float64], NDArray[np.float64]
     return low, high
 
 
+def draw_groups(scene: Primitives, groups: Groups, view: View, buffers: Buffers) -> None:
+    """Fill `buffers` with what `view` sees: front to back, so that most is hidden when its turn comes."""
+    clear(buffers)
+    _draw_in_order(scene, groups, seen(groups, view), view, buffers)
+    find_owners(buffers, groups.members)
+
+
+def seen(groups: Groups, view: View) -> NDArray[np.int64]:
+    """All groups whose sphere the view's left and right edges and its reach let in, those that end nearest
+    first and what moves last.
+    """
+    ends = np.empty(len(groups.ball))
+    _find_ends(groups, view, ends)
+    found = np.flatnonzero(ends > -math.inf)
+    return found[np.argsort(ends[found])]
+
+
 @compiled
-def seen(groups: Groups, view: View) -> NDArray[np.int32]:
-    """The primitives of all groups whose sphere the view's left and right edgesand its reach let in."""
-    out = np.empty(len(groups.members), np.int32)
-    count = 0
+def _find_ends(groups: Groups, view: View, ends: NDArray[np.float64]) -> None:
+    """How far ahead each group ends, -infinity where it is out of sight."""
     slope = 0.5 * view.width / view.focal
     edge = math.sqrt(1.0 + slope * slope)
-    r, f, p = view.right, view.forward, view.position
     for g in range(len(groups.ball)):
-        x, y, z = groups.ball[g, 0] - p[0], groups.ball[g, 1] - p[1], groups.ball[g, 2] - p[2]
-        radius = groups.ball[g, 3]
-        ahead = f[0] * x + f[1] * y + f[2] * z
-        beside = abs(r[0] * x + r[1] * y + r[2] * z)
-        if ahead < -radius or ahead > FAR_M + radius or beside - slope * ahead > radius * edge:
-            continue
-        for k in range(groups.start[g], groups.start[g + 1]):
-            out[count] = groups.members[k]
-            count += 1
-    return out[:count]
+        x, _, z, radius = _ball(groups.ball, g, view)
+        out = z < -radius or z > FAR_M + radius or abs(x) - slope * z > radius * edge
+        ends[g] = -math.inf if out else z + radius
+
+
+@compiled
+def _draw_in_order(
+    scene: Primitives, groups: Groups, order: NDArray[np.int64], view: View, buffers: Buffers
+) -> None:
+    for g in order:
+        if not _is_group_hidden(groups.ball, g, view, buffers):
+            for k in range(groups.start[g], groups.start[g + 1]):
+                draw(scene, groups.members[k], k, view, buffers)
+
+
+@compiled
+def _is_group_hidden(balls: NDArray[np.float64], g: int, view: View, buffers: Buffers) -> bool:
+    """Whether all is hidden that may lie in a group's sphere, with room for rounding."""
+    x, y, z, radius = _ball(balls, g, view)
+    front = z - radius
+    if front < 1.0:
+        return False
+    x0, x1 = _least_slope(x - radius, front, z + radius), -_least_slope(-x - radius, front, z + radius)
+    y0, y1 = _least_slope(y - radius, front, z + radius), -_least_slope(-y - radius, front, z + radius)
+    scale = 2.0 * view.focal
+    box = on_image(
+        x0 * scale + view.width - 2.0,
+        x1 * scale + view.width + 2.0,
+        y0 * scale + view.height - 2.0,
+        y1 * scale + view.height + 2.0,
+        view,
+    )
+    return is_hidden(box, 1.0001 / front, buffers)
+
+
+@compiled
+def _least_slope(x: float, front: float, back: float) -> float:
+    """The least x / z for z between front and back."""
+    return x / front if x < 0.0 else x / back
+
+
+@compiled
+def _ball(balls: NDArray[np.float64], g: int, view: View) -> tuple[float, float, float, float]:
+    """Centre and radius of a sphere in camera coordinates."""
+    p = view.position
+    x, y, z = turned(view, (balls[g, 0] - p[0], balls[g, 1] - p[1], balls[g, 2] - p[2]))
+    return x, y, z, balls[g, 3]

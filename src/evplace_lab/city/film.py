@@ -14,11 +14,11 @@ from evplace.core.events import Size
 from evplace_lab.city import weather
 from evplace_lab.city.camera import ColourCamera
 from evplace_lab.city.conditions import CONDITIONS, Condition, condition
-from evplace_lab.city.culling import group, seen
+from evplace_lab.city.culling import draw_groups, group
 from evplace_lab.city.drive import Drive, Pose, camera_axes, drive_along
 from evplace_lab.city.lightmaps import light_maps
 from evplace_lab.city.mesh import Primitives, join
-from evplace_lab.city.raster import Buffers, View, draw
+from evplace_lab.city.raster import Buffers, View
 from evplace_lab.city.routes import lay_route
 from evplace_lab.city.shading import Frame, shade_frame
 from evplace_lab.city.signals import Signals
@@ -84,17 +84,13 @@ class Film:
         self._traffic: Traffic = traffic_for(town, route, self.drive, self._signals, rng)
         still = join([town.scene, parked_cars(town, rng)])
         self._still = len(still.shape)
-        self._groups = group(still)
+        self._groups = group(still, MOVING)
         self._scene = _with_room(still, MOVING)
         self._maps = light_maps(town, self.light, self._still + MOVING)
         self._size = size
         width, height = size
         self._focal = 0.5 * width / math.tan(math.radians(field_deg) / 2)
-        self._buffers = Buffers(
-            np.empty((2 * height, 2 * width), np.float32),
-            np.empty((2 * height, 2 * width), np.int32),
-            np.empty((self._still + MOVING, 9)),
-        )
+        self._buffers = Buffers.of(size, self._still + MOVING)
         self._frame = Frame(
             np.empty((height, width, 3)), np.empty((height, width)), np.empty((height, width))
         )
@@ -106,10 +102,10 @@ class Film:
 
     def seen_from(self, pose: Pose, t_us: int) -> NDArray[np.float32]:
         """(H, W, 3) linear light at a time as a camera at any other pose sees it."""
-        count = self._populate(pose, t_us)
+        self._groups.start[-1] = self._populate(pose, t_us)
         self._signals.show(self._scene.look, t_us * 1e-6)
         view = view_of(pose, self._focal, self._size)
-        draw(self._scene, self._in_sight(view, count), view, self._buffers)
+        draw_groups(self._scene, self._groups, view, self._buffers)
         shade_frame(self._scene, view, self._buffers, self.light, self._maps, self._frame)
         return self._weathered(pose, view, t_us * 1e-6).astype(np.float32)
 
@@ -124,10 +120,6 @@ class Film:
             radiance = self.radiance(t_us)
             camera.expose(radiance, t_us)
             yield CityFrame(t_us, radiance, camera.picture(radiance), geo_pose(self.drive.pose(t_us)))
-
-    def _in_sight(self, view: View, count: int) -> NDArray[np.int32]:
-        """What may be seen: the groups of still primitives in the field of view, and all that moves."""
-        return np.concatenate([seen(self._groups, view), np.arange(self._still, count, dtype=np.int32)])
 
     def _populate(self, pose: Pose, t_us: int) -> int:
         """Put what moves behind what stands still; returns how many primitives there are."""

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
 from evplace.core.events import Events, Size
 from evplace.core.storage import new_file
 from evplace.imaging.images import Imager, ImageSettings
+from evplace.imaging.sheets import Picture, stacked, write_film
 from evplace.sources.simulators.esim import PRESETS, Simulator
 from evplace_lab.city.camera import ColourCamera, luminance
 from evplace_lab.city.conditions import CONDITIONS
@@ -26,10 +26,7 @@ WARM_UP_US = 100_000
 """Driven before a picture is taken, so that its window of events is full."""
 INKS = 128
 """Colours of a .png, which keeps it small."""
-GAP = 4
 MOVING_FPS = 15
-
-Picture = NDArray[np.uint8]
 
 
 def preview(
@@ -44,7 +41,7 @@ def preview(
     """
     town = build_town(seed)
     rows = [row for name in conditions for row in _rows(town, name, seed, size)]
-    sheet = Image.fromarray(_stacked(rows))
+    sheet = Image.fromarray(stacked(rows))
     with new_file(path, overwrite=True) as file:
         if file.suffix == ".png":
             sheet = sheet.quantize(INKS, dither=Image.Dither.NONE)
@@ -65,13 +62,11 @@ def moving_preview(
     """
     town = build_town(seed)
     films = [_shots(town, name, seed, size, start_m, round(seconds * MOVING_FPS)) for name in conditions]
-    frames = [
-        Image.fromarray(_stacked([[colour for colour, _ in column], [image for _, image in column]]))
+    pictures = [
+        stacked([[colour for colour, _ in column], [image for _, image in column]])
         for column in zip(*films, strict=True)
     ]
-    with new_file(path, overwrite=True) as file:
-        pause = round(1000 / MOVING_FPS)
-        frames[0].save(file, save_all=True, append_images=frames[1:], duration=pause, loop=0, quality=50)
+    write_film(pictures, path, MOVING_FPS, overwrite=True)
 
 
 def _rows(town: Town, name: str, seed: int, size: Size) -> tuple[list[Picture], list[Picture]]:
@@ -99,14 +94,3 @@ def _shots(
                 imager.add(events)
             ink = 255 - imager.image(t_us)
             yield camera.noisy_picture(radiance), np.repeat(ink[..., None], 3, 2)
-
-
-def _stacked(rows: Sequence[Sequence[Picture]]) -> Picture:
-    """Pictures side by side, rows below each other, with white gaps."""
-    width, height = rows[0][0].shape[1], rows[0][0].shape[0]
-    sheet = np.full((len(rows) * (height + GAP) - GAP, len(rows[0]) * (width + GAP) - GAP, 3), 255, np.uint8)
-    for j, row in enumerate(rows):
-        for i, picture in enumerate(row):
-            y, x = j * (height + GAP), i * (width + GAP)
-            sheet[y : y + height, x : x + width] = picture
-    return sheet

@@ -2,7 +2,8 @@
 
 A point O + s U + t V of a parallelogram lands on the image where s / z, t / z and 1 / z are linear in
 the pixel: the inverse of the matrix (U V O). So there is no clipping: each row's span follows from the
-four edges, and a z-buffer of 1 / z decides.
+four edges, and a z-buffer of 1 / z decides. The order in which primitives are drawn makes no difference,
+and what lies behind all that was drawn where it would lie is left out.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.events import Size
 from evplace_lab.city.jit import compiled
 from evplace_lab.city.mesh import QUAD, SPHERE, Primitives
 
@@ -20,6 +22,12 @@ NEAR_M = 0.15
 FAR_M = 350.0
 SMALLEST = 0.02
 """What spans fewer samples is left out."""
+SKY = 1e-6
+"""The nearness of the sky."""
+LAST = (1 << 31) - 1
+"""The rank of the sky."""
+TILE = 8
+"""Samples along a side of the squares of which the farthest sample is known."""
 
 Vec = tuple[float, float, float]
 Box = tuple[float, float, float, float]
@@ -45,12 +53,26 @@ class View(NamedTuple):
 class Buffers(NamedTuple):
     """What the raster leaves behind."""
 
-    nearness: NDArray[np.float32]
-    """(2H, 2W) 1 / depth of each sample."""
+    front: NDArray[np.int64]
+    """(2H, 2W) what is seen at each sample, see `_key`."""
+    least: NDArray[np.int64]
+    """(2H / TILE, 2W / TILE) no sample of a tile has a smaller key."""
     owner: NDArray[np.int32]
     """(2H, 2W) the primitive seen, -1 for sky."""
     planes: NDArray[np.float64]
     """(N, 9) s / z, t / z and 1 / z as linear functions of the sample position."""
+
+    @classmethod
+    def of(cls, size: Size, count: int) -> Buffers:
+        """For images of `size` (width, height) and up to `count` primitives."""
+        columns, rows = (2 * length for length in size)
+        tiles = (-(-rows // TILE), -(-columns // TILE))
+        return cls(
+            np.empty((rows, columns), np.int64),
+            np.empty(tiles, np.int64),
+            np.empty((rows, columns), np.int32),
+            np.empty((count, 9)),
+        )
 
 
 @compiled
@@ -60,47 +82,101 @@ def sample_offset(row: int) -> float:
 
 
 @compiled
-def draw(scene: Primitives, chosen: NDArray[np.int32], view: View, buffers: Buffers) -> None:
-    """Fill `buffers` with the `chosen` primitives as `view` sees them."""
-    buffers.nearness[:] = 1e-6
-    buffers.owner[:] = -1
-    for q in chosen:
-        f = scene.frame[q]
-        p = view.position
-        o = _turned(view, (f[0] - p[0], f[1] - p[1], f[2] - p[2]))
-        round_ = scene.shape[q] == SPHERE
-        if round_:
-            if not _ball_in_sight(o, f[3], view):
-                continue
-            o, u, v = _facing_square(o, f[3])
-        else:
-            u = _turned(view, (f[3], f[4], f[5]))
-            v = _turned(view, (f[6], f[7], f[8]))
-            lowest = o[2] + min(u[2], 0.0) + min(v[2], 0.0)
-            highest = o[2] + max(u[2], 0.0) + max(v[2], 0.0)
-            if highest < NEAR_M or lowest > FAR_M:
-                continue
-        x = _cross(v, o)
-        determinant = u[0] * x[0] + u[1] * x[1] + u[2] * x[2]
-        if abs(determinant) < 1e-9 or (determinant > 0.0 and not round_):
-            continue  # edge on, or seen from behind
-        box = _bounds(o, u, v, view)
-        if box[0] > box[1]:
-            continue
-        a = _in_samples(x, determinant, view)
-        b = _in_samples(_cross(o, u), determinant, view)
-        c = _in_samples(_cross(u, v), determinant, view)
-        for k in range(3):
-            buffers.planes[q, k] = a[k]
-            buffers.planes[q, 3 + k] = b[k]
-            buffers.planes[q, 6 + k] = c[k]
-        taper = (scene.taper[q, 0], scene.taper[q, 1])
-        full = scene.shape[q] == QUAD
-        _fill(q, (a, b, c), box, taper, full, view, buffers.nearness, buffers.owner)
+def _key(near: float, rank: int) -> int:
+    """A number that is larger for what is nearer, and of what is as near for what has the lower rank: the
+    bits of a float above the rank. Samples are worked out side by side, since one `max` of keys decides.
+    """
+    return int(np.float32(near).view(np.int32)) << 32 | (LAST - rank)
 
 
 @compiled
-def _turned(view: View, v: Vec) -> Vec:
+def clear(buffers: Buffers) -> None:
+    """Nothing but sky."""
+    buffers.front[:] = _key(SKY, LAST)
+    buffers.least[:] = _key(SKY, LAST)
+
+
+@compiled
+def find_owners(buffers: Buffers, members: NDArray[np.int32]) -> None:
+    """Which primitive is seen at each sample; `members` gives that of each rank."""
+    for row in range(buffers.front.shape[0]):
+        for x in range(buffers.front.shape[1]):
+            rank = LAST - (buffers.front[row, x] & LAST)
+            buffers.owner[row, x] = -1 if rank == LAST else members[rank]
+
+
+@compiled
+def draw(scene: Primitives, q: int, rank: int, view: View, buffers: Buffers) -> None:
+    """Add primitive `q` to `buffers` as `view` sees it; of two that are as near, the lower rank wins."""
+    f = scene.frame[q]
+    p = view.position
+    o = turned(view, (f[0] - p[0], f[1] - p[1], f[2] - p[2]))
+    round_ = scene.shape[q] == SPHERE
+    if round_:
+        if not _ball_in_sight(o, f[3], view):
+            return
+        o, u, v = _facing_square(o, f[3])
+    else:
+        u = turned(view, (f[3], f[4], f[5]))
+        v = turned(view, (f[6], f[7], f[8]))
+        lowest = o[2] + min(u[2], 0.0) + min(v[2], 0.0)
+        highest = o[2] + max(u[2], 0.0) + max(v[2], 0.0)
+        if highest < NEAR_M or lowest > FAR_M:
+            return
+    x = _cross(v, o)
+    determinant = u[0] * x[0] + u[1] * x[1] + u[2] * x[2]
+    if abs(determinant) < 1e-9 or (determinant > 0.0 and not round_):
+        return  # edge on, or seen from behind
+    box = _bounds(o, u, v, view)
+    if box[0] > box[1]:
+        return
+    c = _in_samples(_cross(u, v), determinant, view)
+    if is_hidden(box, _nearest(c, box), buffers):
+        return
+    a = _in_samples(x, determinant, view)
+    b = _in_samples(_cross(o, u), determinant, view)
+    for k in range(3):
+        buffers.planes[q, k] = a[k]
+        buffers.planes[q, 3 + k] = b[k]
+        buffers.planes[q, 6 + k] = c[k]
+    taper = (scene.taper[q, 0], scene.taper[q, 1])
+    full = scene.shape[q] == QUAD
+    _fill(rank, (a, b, c), box, taper, full, buffers.front)
+
+
+@compiled
+def is_hidden(box: Box, near: float, buffers: Buffers) -> bool:
+    """Whether all samples in `box` are nearer than `near`."""
+    key = _key(near, 0)
+    for j in range(int(box[2]) // TILE, int(box[3]) // TILE + 1):
+        for i in range(int(box[0]) // TILE, int(box[1]) // TILE + 1):
+            if buffers.least[j, i] <= key:
+                rows, columns = slice(j * TILE, (j + 1) * TILE), slice(i * TILE, (i + 1) * TILE)
+                buffers.least[j, i] = _least(buffers.front[rows, columns])
+                if buffers.least[j, i] <= key:
+                    return False
+    return True
+
+
+@compiled
+def _least(tile: NDArray[np.int64]) -> int:
+    least = int(tile[0, 0])
+    for y in range(tile.shape[0]):
+        for x in range(tile.shape[1]):
+            least = min(least, int(tile[y, x]))
+    return least
+
+
+@compiled
+def _nearest(c: Vec, box: Box) -> float:
+    """The largest nearness of a plane on whole samples of `box`, rounded as `_fill` rounds it."""
+    row = box[3] if c[1] > 0.0 else box[2]
+    offset, x = (0.75, box[1]) if c[0] > 0.0 else (0.25, box[0])
+    return c[1] * (row + 0.5) + c[2] + c[0] * offset + c[0] * x
+
+
+@compiled
+def turned(view: View, v: Vec) -> Vec:
     """A vector of the world in camera coordinates."""
     r, d, f = view.right, view.down, view.forward
     return (
@@ -148,7 +224,7 @@ def _in_samples(row: Vec, determinant: float, view: View) -> Vec:
 
 @compiled
 def _bounds(o: Vec, u: Vec, v: Vec, view: View) -> Box:
-    """The samples that the four corners span, cut at the near plane; NOWHERE if none is on the image."""
+    """The samples that the four corners may span, cut at the near plane; NOWHERE if none is on the image."""
     uv = (o[0] + u[0] + v[0], o[1] + u[1] + v[1], o[2] + u[2] + v[2])
     u = (o[0] + u[0], o[1] + u[1], o[2] + u[2])
     v = (o[0] + v[0], o[1] + v[1], o[2] + v[2])
@@ -159,7 +235,14 @@ def _bounds(o: Vec, u: Vec, v: Vec, view: View) -> Box:
     outside = x1 < 0 or y1 < 0 or x0 > 2 * view.width or y0 > 2 * view.height
     if outside or x1 - x0 < SMALLEST or y1 - y0 < SMALLEST:
         return NOWHERE
-    return (x0, x1, y0, y1)
+    return on_image(x0 - 1.0, x1 + 1.0, math.floor(y0 - 0.5), math.ceil(y1 + 0.5), view)
+
+
+@compiled
+def on_image(x0: float, x1: float, y0: float, y1: float, view: View) -> Box:
+    """The part of a box that lies on the image."""
+    right, bottom = 2.0 * view.width - 1.0, 2.0 * view.height - 1.0
+    return (max(0.0, x0), min(right, x1), max(0.0, y0), min(bottom, y1))
 
 
 @compiled
@@ -180,37 +263,32 @@ def _grown(box: Box, x: float, y: float) -> Box:
 
 @compiled
 def _fill(
-    q: int,
+    rank: int,
     plane: tuple[Vec, Vec, Vec],
     box: Box,
     taper: tuple[float, float],
     full: bool,
-    view: View,
-    nearness: NDArray[np.float32],
-    owner: NDArray[np.int32],
+    front: NDArray[np.int64],
 ) -> None:
     """Each row's span of one primitive; the nearest wins."""
     a, b, c = plane
-    first = max(0, math.floor(box[2] - 0.5))
-    last = min(2 * view.height - 1, math.ceil(box[3] + 0.5))
-    left, right = max(0.0, box[0] - 1.0), min(2.0 * view.width - 1.0, box[1] + 1.0)
-    for row in range(first, last + 1):
+    for row in range(int(box[2]), int(box[3]) + 1):
         offset = sample_offset(row)
         s = a[1] * (row + 0.5) + a[2] + a[0] * offset
         t = b[1] * (row + 0.5) + b[2] + b[0] * offset
         w = c[1] * (row + 0.5) + c[2] + c[0] * offset
-        span = _cut((left, right), b[0], t)
+        span = _cut((box[0], box[1]), b[0], t)
         span = _cut(span, c[0] - b[0], w - t)
         span = _cut(span, a[0] - taper[0] * b[0], s - taper[0] * t)
         span = _cut(span, c[0] - a[0] - taper[1] * b[0], w - s - taper[1] * t)
-        for x in range(math.ceil(span[0]), math.floor(span[1]) + 1):
-            near = w + c[0] * x
-            if np.float32(near) > nearness[row, x]:
-                i = s + a[0] * x - 0.5 * near
-                j = t + b[0] * x - 0.5 * near
-                if full or i * i + j * j < 0.25 * near * near:
-                    nearness[row, x] = np.float32(near)
-                    owner[row, x] = q
+        first = math.ceil(span[0])
+        line = front[row, first : max(math.floor(span[1]) + 1, first)]
+        for k in range(len(line)):
+            near = w + c[0] * (first + k)
+            i = s + a[0] * (first + k) - 0.5 * near
+            j = t + b[0] * (first + k) - 0.5 * near
+            if full or i * i + j * j < 0.25 * near * near:
+                line[k] = max(line[k], _key(near, rank))
 
 
 @compiled

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 from tyro.constructors import PrimitiveConstructorSpec
@@ -26,7 +26,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 from evplace.cli._output import note, print_json, print_table, progress, say
 from evplace.core.errors import SettingsError
 from evplace_lab.benchmark import OURS, Given, Rule, Submission, bench, check, robustness, tables, tasks_of
-from evplace_lab.benchmark._expected import deviations
+from evplace_lab.benchmark._expected import METHOD, expected, held
 from evplace_lab.benchmark._exports import export
 from evplace_lab.benchmark._robust_page import page
 
@@ -122,10 +122,22 @@ def _on_a_city(args: Args, city: Path) -> int:
         return 0
     for table in tables(document):
         print_table(*table)
-    for deviation in deviations(document, city):
-        note(deviation)
+    _say_held(document, city)
     say(f"Kept in {args.out}/bench.json; evplace report {args.out} makes a page of it")
     return 0
+
+
+def _say_held(document: dict[str, Any], city: Path) -> None:
+    """Whether our own figures are those that were found before, where there are such."""
+    known, (alike, others) = expected(), held(document, city)
+    for other in others:
+        note(other)
+    if alike:
+        figures = f"{alike} of {alike + len(others)}" if others else f"All {alike}"
+        say(
+            f"{figures} figures of '{METHOD}' are those of evplace {known['evplace']} on {known['city']}, "
+            f"within {known['tolerance']:g} point"
+        )
 
 
 def _checked(args: Args, found: list[tuple[str, str, Given]]) -> int:

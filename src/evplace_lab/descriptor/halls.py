@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.events import Size
-from evplace_lab.city.culling import group, seen
+from evplace_lab.city.culling import draw_groups, group
 from evplace_lab.city.drive import CAMERA_M, Pose
 from evplace_lab.city.film import view_of
 from evplace_lab.city.light import Light, Maps
 from evplace_lab.city.materials import CAR_SIDE, FENCE, LAMP, PAVEMENT, PLAIN, ROOF, SIGN
 from evplace_lab.city.mesh import Mesh, Primitives, up
-from evplace_lab.city.raster import Buffers, draw
+from evplace_lab.city.raster import Buffers
 from evplace_lab.city.shading import Frame, shade_frame
 
 STEPS = 2000
@@ -115,10 +115,7 @@ class HallFilm:
         self._maps = _maps(hall, len(self._scene.shape), rng)
         self._size, (width, height) = size, size
         self._focal = 0.5 * width / math.tan(math.radians(field_deg) / 2)
-        samples, count = (2 * height, 2 * width), len(self._scene.shape)
-        self._buffers = Buffers(
-            np.empty(samples, np.float32), np.empty(samples, np.int32), np.empty((count, 9))
-        )
+        self._buffers = Buffers.of(size, len(self._scene.shape))
         self._frame = Frame(
             np.empty((height, width, 3)), np.empty((height, width)), np.empty((height, width))
         )
@@ -137,7 +134,7 @@ class HallFilm:
     def seen_from(self, pose: Pose) -> NDArray[np.float32]:
         """(H, W, 3) linear light."""
         view = view_of(pose, self._focal, self._size)
-        draw(self._scene, seen(self._groups, view), view, self._buffers)
+        draw_groups(self._scene, self._groups, view, self._buffers)
         shade_frame(self._scene, view, self._buffers, self._light, self._maps, self._frame)
         return self._frame.radiance.astype(np.float32)
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from evplace.evaluation import Result
-from evplace.imaging.sheets import as_shown
+from evplace.imaging.sheets import Picture, as_shown
 
 BUDGET = 12_000_000
 """Characters of all images in a page."""
@@ -36,7 +35,7 @@ def _of(result: Result) -> Shown:
     samples = result.samples
     assert samples is not None
     true_item = np.full(len(result.judged), 0) if result.true_item is None else result.true_item
-    events = _are_events(result.settings)
+    events = are_events(result)
     shown = []
     for query, images in zip(samples.query.tolist(), samples.images, strict=True):
         there = (True, result.answers.item[query] >= 0, true_item[query] >= 0)
@@ -53,9 +52,9 @@ def _evenly(samples: Shown, many: int) -> Shown:
     return [samples[at] for at in np.linspace(0, len(samples) - 1, many).astype(int)] if samples else []
 
 
-def _are_events(settings: Mapping[str, Any]) -> bool:
+def are_events(result: Result) -> bool:
     """Whether the map was made of event images."""
-    of_map = settings.get("map")
+    of_map = result.settings.get("map")
     recipe = of_map.get("recipe") if isinstance(of_map, Mapping) else None
     return isinstance(recipe, Mapping) and recipe.get("kind") == "events"
 
@@ -69,9 +68,14 @@ def similarity_image(result: Result) -> str:
 
 def _source(image: NDArray[np.uint8], events: bool) -> str:
     """An image (h, w) or (h, w, C) as the address of a PNG that holds itself."""
-    shown = as_shown(_stretched(image) if events else image, events)
+    shown = for_the_eye(image, events)
     grey = bool(np.all(shown == shown[..., :1]))
     return _png(shown[..., 0] if grey else shown, LEVELS["grey" if grey else "colours"])
+
+
+def for_the_eye(image: NDArray[np.uint8], events: bool) -> Picture:
+    """An image (h, w) or (h, w, C) as it is shown, however few its events are."""
+    return as_shown(_stretched(image) if events else image, events)
 
 
 def _stretched(image: NDArray[np.uint8]) -> NDArray[np.uint8]:

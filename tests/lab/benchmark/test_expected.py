@@ -5,8 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from evplace_lab.benchmark._expected import deviations, expected
+import pytest
+
+from evplace_lab.benchmark._expected import expected, held
 from evplace_lab.city import VERSION, CitySettings
+from evplace_lab.cli.bench import _say_held
 
 PAGE = Path(__file__).parents[3] / "docs" / "protocol.md"
 INPUTS = ("ideal", "from-8bit", "weak", "colour")
@@ -24,15 +27,24 @@ def test_the_page_shows_the_figures_that_are_kept() -> None:
         assert f"| {query} | {' | '.join(cells)} |" in text
 
 
-def test_other_figures_of_the_frozen_city_are_told(tmp_path: Path) -> None:
+def test_figures_of_the_frozen_city_are_held_against_those_before(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     figures = expected()["ideal"]["night-2"]
     row = {"query": "night-2", "method": "best", **{name: value / 100 for name, value in figures.items()}}
     document = {"rule": "view", "input": "ideal", "rows": [row]}
     (tmp_path / "city.json").write_text(json.dumps({"version": VERSION, **CitySettings().of_drive()}))
-    assert list(deviations(document, tmp_path)) == []
+    assert held(document, tmp_path) == (len(figures), [])
+    _say_held(document, tmp_path)
+    assert f"All {len(figures)} figures of 'best' are those of evplace" in capsys.readouterr().out
     row["accuracy"] -= 0.05
-    (told,) = deviations(document, tmp_path)
+    alike, (told,) = held(document, tmp_path)
+    assert alike == len(figures) - 1
+    _say_held(document, tmp_path)
+    said = capsys.readouterr()
+    assert said.out.startswith(f"{alike} of {len(figures)} figures of 'best' are those of")
+    assert told in said.err
     assert f"accuracy of 'best' is {figures['accuracy'] - 5:.1f} %" in told
-    assert list(deviations({**document, "rule": "places"}, tmp_path)) == []
+    assert held({**document, "rule": "places"}, tmp_path) == (0, [])
     (tmp_path / "city.json").write_text(json.dumps({"version": VERSION, "seed": 101}))
-    assert list(deviations(document, tmp_path)) == []
+    assert held(document, tmp_path) == (0, [])

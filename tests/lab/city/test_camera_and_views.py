@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 import utm
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -26,12 +26,12 @@ from evplace_lab.city.camera import (
     _mean,
 )
 from evplace_lab.city.conditions import CONDITIONS
-from evplace_lab.city.culling import CELL_M, Groups, group, seen
+from evplace_lab.city.culling import CELL_M, Groups, draw_groups, group, seen
 from evplace_lab.city.drive import Pose
 from evplace_lab.city.film import EAST, NORTH, TURN, ZONE, geo_pose, view_of
 from evplace_lab.city.mesh import SPHERE, Mesh, Primitives
 from evplace_lab.city.plan import CitySettings, drive_name, drive_number
-from evplace_lab.city.raster import FAR_M, Buffers, View, draw
+from evplace_lab.city.raster import FAR_M, Buffers, View, clear, draw, is_hidden
 
 
 def even(level: float, size: tuple[int, int] = (24, 32)) -> NDArray[np.float32]:
@@ -99,15 +99,19 @@ def test_noise_is_as_strong_as_light_and_gain_make_it(level: float) -> None:
     assert clean.std() == 0
 
 
-def scattered(seed: int, count: int = 400) -> Primitives:
+def scattered(seed: int, count: int = 400, reach: float = 450.0) -> Primitives:
     mesh, rng = Mesh(), np.random.default_rng(seed)
     for k in range(count):
-        x, y, z = rng.uniform((-450, -450, 0), (450, 450, 8))
+        x, y, z = rng.uniform((-reach, -reach, 0), (reach, reach, 8))
         if k % 5 == 0:
             mesh.sphere((x, y, z), rng.uniform(0.5, 4.0), 3, (1, 1, 1))
         else:
             mesh.quad((x, y, z), rng.normal(0, 6, 3), rng.normal(0, 6, 3), 3, (1, 1, 1))
     return mesh.primitives()
+
+
+def primitives_of(groups: Groups, chosen: NDArray[np.int64]) -> NDArray[np.int32]:
+    return np.concatenate([groups.members[groups.start[g] : groups.start[g + 1]] for g in chosen])
 
 
 @given(st.integers(0, 30))
@@ -117,7 +121,7 @@ def test_groups_hold_every_primitive_once_within_their_sphere(seed: int) -> None
     assert sorted(groups.members.tolist()) == list(range(60))
     assert groups.start[0] == 0
     assert groups.start[-1] == 60
-    for g, ball in enumerate(groups.ball):
+    for g, ball in enumerate(groups.ball[:-1]):
         inside = groups.members[groups.start[g] : groups.start[g + 1]]
         o, u, v = (parts.frame[inside, k : k + 3] for k in (0, 3, 6))
         flat = parts.shape[inside] != SPHERE
@@ -129,21 +133,53 @@ def test_groups_hold_every_primitive_once_within_their_sphere(seed: int) -> None
         assert len(np.unique(np.floor(middles / CELL_M), axis=0)) == 1
 
 
-@given(st.floats(-3.1, 3.1), st.floats(-200, 200), st.floats(-200, 200))
-def test_nothing_that_the_raster_would_draw_is_left_out(yaw: float, x: float, y: float) -> None:
-    scene = SCATTERED
+def front_of_each_alone(scene: Primitives, view: View) -> NDArray[np.int64]:
+    """The largest key of all primitives at each sample, none of which ever hides another."""
+    buffers, groups = Buffers.of((32, 24), len(scene.shape)), group(scene)
+    fronts = []
+    for rank, q in enumerate(groups.members):
+        clear(buffers)
+        draw(scene, int(q), rank, view, buffers)
+        fronts.append(buffers.front.copy())
+    return np.max(fronts, axis=0)
+
+
+@settings(max_examples=30)
+@given(st.floats(-3.1, 3.1), st.floats(-20, 20), st.floats(-20, 20), st.booleans())
+def test_nothing_that_is_in_front_is_left_out(yaw: float, x: float, y: float, crowded: bool) -> None:
+    scene = CROWDED if crowded else SCATTERED
     view = view_of(Pose(x, y, 1.5, yaw, 0.0, 0.0, 0.0, 0.0, 0.0), 19.0, (32, 24))
-    owners = []
-    for chosen in (np.arange(len(scene.shape), dtype=np.int32), seen(group(scene), view)):
-        buffers = Buffers(
-            np.empty((48, 64), np.float32), np.empty((48, 64), np.int32), np.empty((len(scene.shape), 9))
-        )
-        draw(scene, np.sort(chosen), view, buffers)
-        owners.append(buffers.owner)
-    np.testing.assert_array_equal(*owners)
+    buffers = Buffers.of((32, 24), len(scene.shape))
+    draw_groups(scene, group(scene), view, buffers)
+    np.testing.assert_array_equal(buffers.front, front_of_each_alone(scene, view))
 
 
-SCATTERED = scattered(7)
+SCATTERED, CROWDED = scattered(7), scattered(8, 200, 60.0)
+
+
+def test_what_lies_behind_a_wall_is_hidden_but_not_beside_it() -> None:
+    view = View((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), 19.0, 32, 24)
+    mesh = Mesh()
+    mesh.quad((5.0, 0.0, -9.0), (0.0, -9.0, 0.0), (0.0, 0.0, 18.0), 3, (1, 1, 1))
+    scene, buffers = mesh.primitives(), Buffers.of((32, 24), 1)
+    clear(buffers)
+    draw(scene, 0, 0, view, buffers)
+    assert is_hidden((33.0, 63.0, 0.0, 47.0), 1 / 5.01, buffers)
+    assert not is_hidden((33.0, 63.0, 0.0, 47.0), 1 / 5, buffers)
+    assert not is_hidden((31.0, 63.0, 0.0, 47.0), 1 / 5.01, buffers)
+
+
+def test_of_two_in_one_place_the_first_of_the_groups_is_seen() -> None:
+    mesh = Mesh()
+    for _ in range(2):
+        mesh.quad((5.0, 9.0, -9.0), (0.0, -18.0, 0.0), (0.0, 0.0, 18.0), 3, (1, 1, 1))
+    scene = mesh.primitives()
+    view = View((0.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), 19.0, 32, 24)
+    for order in ([0, 1], [1, 0]):
+        buffers = Buffers.of((32, 24), 2)
+        groups = group(scene)._replace(members=np.array(order, np.int32))
+        draw_groups(scene, groups, view, buffers)
+        assert (buffers.owner == order[0]).all()
 
 
 @pytest.mark.parametrize("side", [-1, 1])
@@ -164,7 +200,8 @@ def test_a_group_is_left_out_where_its_sphere_touches_no_part_of_the_view(side: 
 
 def test_most_of_a_town_is_left_out() -> None:
     view = View((0.0, 0.0, 1.5), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), 19.0, 32, 24)
-    chosen = seen(group(SCATTERED), view)
+    groups = group(SCATTERED)
+    chosen = primitives_of(groups, seen(groups, view))
     assert 0 < len(chosen) < 0.5 * len(SCATTERED.shape)
     far = SCATTERED.frame[chosen, 0]
     assert far.min() > -40

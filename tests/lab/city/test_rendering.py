@@ -12,9 +12,10 @@ from evplace.sources.simulators.motion import image_motion
 from evplace_lab.city import Film
 from evplace_lab.city.camera import ColourCamera, grey, luminance
 from evplace_lab.city.conditions import CONDITIONS
+from evplace_lab.city.culling import draw_groups, group
 from evplace_lab.city.figures import STRIDES, car, person
 from evplace_lab.city.mesh import OVAL, SPHERE, Mesh, Primitives
-from evplace_lab.city.raster import Buffers, View, draw, sample_offset
+from evplace_lab.city.raster import Buffers, View, sample_offset
 from evplace_lab.city.signals import RED_S
 from evplace_lab.city.town import Town
 
@@ -40,9 +41,8 @@ def clutter() -> Primitives:
 
 
 def drawn(scene: Primitives) -> Buffers:
-    count = len(scene.shape)
-    buffers = Buffers(np.empty((48, 64), np.float32), np.empty((48, 64), np.int32), np.empty((count, 9)))
-    draw(scene, np.arange(count, dtype=np.int32), VIEW, buffers)
+    buffers = Buffers.of((VIEW.width, VIEW.height), len(scene.shape))
+    draw_groups(scene, group(scene), VIEW, buffers)
     return buffers
 
 

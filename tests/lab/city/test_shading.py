@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from evplace_lab.city.conditions import Condition
+from evplace_lab.city.culling import draw_groups, group
 from evplace_lab.city.light import Light, Maps, sky
 from evplace_lab.city.materials import LAMP, LEAVES, PAVEMENT, PLAIN, ROAD
 from evplace_lab.city.mesh import (
@@ -24,7 +25,7 @@ from evplace_lab.city.mesh import (
     placed,
     up,
 )
-from evplace_lab.city.raster import FAR_M, NEAR_M, Buffers, View, _cut, _turned, draw, sample_offset
+from evplace_lab.city.raster import FAR_M, NEAR_M, Buffers, View, _cut, sample_offset, turned
 from evplace_lab.city.shading import Frame, _share, _softened, _spot, shade_frame
 
 WIDTH, HEIGHT, FOCAL = 32, 24, 20.0
@@ -41,13 +42,9 @@ NO_MAPS = Maps(
 
 def shaded(scene: Primitives, light: Light = CLEAR, view: View = VIEW) -> tuple[Frame, Buffers]:
     shape = (view.height, view.width)
-    buffers = Buffers(
-        np.empty((2 * shape[0], 2 * shape[1]), np.float32),
-        np.empty((2 * shape[0], 2 * shape[1]), np.int32),
-        np.empty((len(scene.shape) + 1, 9)),
-    )
+    buffers = Buffers.of((view.width, view.height), len(scene.shape) + 1)
     frame = Frame(np.empty((*shape, 3)), np.empty(shape), np.empty(shape))
-    draw(scene, np.arange(len(scene.shape), dtype=np.int32), view, buffers)
+    draw_groups(scene, group(scene), view, buffers)
     shade_frame(scene, view, buffers, light, NO_MAPS, frame)
     return frame, buffers
 
@@ -252,7 +249,7 @@ def brute(view: View, points: NDArray[np.float64]) -> NDArray[np.float64]:
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3))
 def test_the_camera_turns_vectors_by_its_axes(x: float, y: float, z: float) -> None:
     wanted = brute(VIEW, np.array([[x, y, z]]) + VIEW.position)[0]
-    np.testing.assert_allclose(_turned(VIEW, (x, y, z)), wanted, atol=1e-12)
+    np.testing.assert_allclose(turned(VIEW, (x, y, z)), wanted, atol=1e-12)
 
 
 def test_an_oval_is_its_rectangles_ellipse_and_a_trapezium_is_narrower_above() -> None:

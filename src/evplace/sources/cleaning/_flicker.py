@@ -72,8 +72,9 @@ class FlickerMeter:
         if len(events) and self._start_us[0] == np.iinfo(np.int64).min:
             self._start_us[0] = events.t_us[0]
         _beat(
-            events.t_us, events.x, events.y, events.p, self._row, self._column, self.window_us, self._waves,
-            self._start_us, self._sums, self._totals, self._events, self._power, self._pairs,
+            events.t_us, events.x, events.y, events.p.view(np.uint8), self._row, self._column,
+            self.window_us, self._waves, self._start_us, self._sums, self._totals, self._events,
+            self._power, self._pairs,
         )  # fmt: skip
 
     def pairs(self) -> NDArray[np.float64]:
@@ -134,10 +135,12 @@ class FlickerFilter:
 
 def _waves(teeth: Sequence[int], window_us: int) -> NDArray[np.int8]:
     """(steps of a window, columns) cosines of all teeth, then sines, then nothing."""
-    turns = np.outer(np.arange(0, window_us, _STEP_US), teeth) / 1e6 % 1
-    waves = np.zeros((len(turns), -(-2 * len(teeth) // _LANES) * _LANES), np.int8)
-    waves[:, : len(teeth)] = np.rint(_HIGH * np.cos(2 * np.pi * turns))
-    waves[:, len(teeth) : 2 * len(teeth)] = np.rint(_HIGH * np.sin(2 * np.pi * turns))
+    turn = 1_000_000 // _STEP_US
+    wave = np.rint(_HIGH * np.cos(2 * np.pi * np.arange(turn) / turn)).astype(np.int8)  # each value once
+    at = np.outer(np.arange(-(-window_us // _STEP_US)), teeth) % turn
+    waves = np.zeros((len(at), -(-2 * len(teeth) // _LANES) * _LANES), np.int8)
+    waves[:, : len(teeth)] = wave[at]
+    waves[:, len(teeth) : 2 * len(teeth)] = wave[at - turn // 4]
     return waves
 
 
@@ -146,7 +149,7 @@ def _beat(
     t_us: NDArray[np.int64],
     x: NDArray[np.uint16],
     y: NDArray[np.uint16],
-    p: Mask,
+    p: NDArray[np.uint8],
     row: Counts,
     column: Counts,
     window_us: int,
@@ -161,24 +164,26 @@ def _beat(
     """Sum signed waves in the window from start_us[0]; a complete window goes to power and pairs.
 
     `row` + `column` is the region. Sums are whole numbers; before one can pass 16 bits, it goes to `totals`.
+    `p` comes as numbers, from which a sign is computed: a branch would go wrong half the time.
     """
-    columns = np.uint64(
-        waves.shape[1]
-    )  # unsigned, so that an index needs no look whether it counts from the end
+    # Unsigned, so that an index needs no look whether it counts from the end.
+    columns, summed = np.uint64(waves.shape[1]), np.uint64(_SUMMED)
+    start = start_us[0]
     for i in range(len(t_us)):
-        if t_us[i] - start_us[0] >= window_us:
+        if t_us[i] - start >= window_us:
             for each in range(len(events)):
                 _close(sums[each], totals[each], events[each], power[each])
                 pairs[each] += events[each] * (events[each] - 1.0)
             events[:] = 0
-            start_us[0] += (t_us[i] - start_us[0]) // window_us * window_us
+            start += (t_us[i] - start) // window_us * window_us
+            start_us[0] = start
         place = np.uint64(row[y[i]] + column[x[i]])
-        step = np.uint64((t_us[i] - start_us[0]) // _STEP_US)
-        sign = np.int16(1 if p[i] else -1)
+        step = np.uint64(t_us[i] - start) // np.uint64(_STEP_US)
+        sign = np.int16(2 * np.int16(p[i]) - 1)
         for k in range(columns):
             sums[place, k] += sign * np.int16(waves[step, k])
         events[place] += 1
-        if events[place] % _SUMMED == 0:
+        if np.uint64(events[place]) % summed == 0:
             for k in range(columns):
                 totals[place, k] += sums[place, k]
                 sums[place, k] = 0

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from conftest import Drive
-from evplace._regions import FASTEST_MPS, Regions
 from evplace.core import families
 from evplace.core.errors import PlaceMapError, SettingsError, TrackError
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
+from evplace.localizer._regions import FASTEST_MPS, Regions
 from evplace.matchers.bayes import Bayes
 from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid, PlaceRuns
