@@ -2,8 +2,9 @@
 
     OPENBLAS_NUM_THREADS=1 python bench/bench_answers.py [--references 10000]
 
-10,000 references of 160x90, a 640x480 sensor; the network has places. The window is closed by `tick`, so its
-image is in the time, too. sad and cosine read 144 and 576 MB an image.
+10,000 references of 160x90, a 640x480 sensor; the network has 1,000 places of ten of them each. The window is
+closed by `tick`, so its image is in the time, too. The network reads 74 MB an image, edges 88, sad 144 and
+cosine 576.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ def main() -> None:
     day = drive(args.references)
     for scorer in args.scorers:
         more = {"steps": 1} if scorer == "network" else {}
-        places = PlaceRuns(args.references) if scorer == "network" else PlaceGrid.from_track(day.track)
+        places = PlaceRuns(args.references, 10) if scorer == "network" else PlaceGrid.from_track(day.track)
         where = Localizer(train(day, places, scorer, **more))
         took = []
         for number in range(args.windows):

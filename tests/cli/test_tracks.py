@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -114,3 +115,15 @@ def test_a_clock_that_was_set_and_a_speed_that_cannot_be(
 )
 def test_flags_of_a_track_need_one(recording: Path, capsys: Capture, flag: tuple[str, str]) -> None:
     assert "need a --track" in images(capsys, recording, *flag, code=2)[1][0]
+
+
+@pytest.mark.parametrize("log", [rmc_log, csv_log])
+def test_a_log_that_is_taken_for_a_recording_is_named(
+    tmp_path: Path, capsys: Capture, log: Callable[[Log], str]
+) -> None:
+    file = written(tmp_path, log(LOG))
+    for words in (["info", str(file)], ["images", str(file), "-o", f"{tmp_path}/out"]):
+        assert main(words) == 2
+        (told,) = capsys.readouterr().err.splitlines()
+        assert "is a log of positions" in told
+        assert "give it as the --track of one" in told

@@ -106,22 +106,21 @@ class Resampler:
         self._rows, self._columns = rows, columns
         # The narrowest whole numbers that hold every sum: the narrower, the more of them fit a vector.
         kind = np.uint8 if rows.total < 1 << 8 else np.uint16 if rows.total < 1 << 16 else np.uint32
-        self._wide = np.uint16 if rows.total * columns.total < 1 << 16 else np.uint32
+        self._bits = 16 if rows.total * columns.total < 1 << 16 else 32
         self._row_weights = rows.weights.astype(kind)
-        self._column_weights = columns.weights.astype(self._wide)
+        self._column_weights = columns.weights.astype(np.uint64)
         self._scale = np.float32(1 / (rows.total * columns.total))
 
     def binary(self, canvas: NDArray[np.int8]) -> NDArray[np.float32]:
         """A canvas (H, W) of 0 and -1 (set) -> (h, w) float32 in [0, 1]; exact but for the last division."""
         if self._rows.total * self._columns.total >= 1 << 32:
             return self.values(-canvas.astype(np.float32))
-        rows, columns = self._rows, self._columns
+        rows, columns, width = self._rows, self._columns, canvas.shape[1]
         out = np.empty((len(rows.start), len(columns.start)), np.float32)
-        lines = np.empty((len(rows.start), canvas.shape[1]), self._row_weights.dtype)
-        sums = np.empty((len(columns.start), len(rows.start)), self._wide)
         _resample_binary(
-            canvas, rows.start, self._row_weights, columns.start, self._column_weights, lines,
-            np.empty(lines.T.shape, lines.dtype), sums, self._scale, out,
+            canvas, rows.start, self._row_weights, columns.start, self._column_weights, self._bits,
+            np.empty(width, self._row_weights.dtype), np.empty(width, np.uint64),
+            np.empty(len(columns.start), np.uint64), self._scale, out,
         )  # fmt: skip
         return out
 
@@ -137,34 +136,55 @@ class Resampler:
 
 @njit(cache=True)
 def _resample_binary(
-    canvas: Any, row_start: Any, row_weights: Any, column_start: Any, column_weights: Any, lines: Any,
-    turned: Any, sums: Any, scale: Any, out: Any,
+    canvas: Any, row_start: Any, row_weights: Any, column_start: Any, column_weights: Any, bits: int,
+    line: Any, words: Any, sums: Any, scale: Any, out: Any,
 ) -> None:  # fmt: skip
-    """Both passes run along contiguous memory: between them the lines are turned."""
-    _masked_rows(canvas, row_start, row_weights, lines)
-    _turn(lines, turned)
-    _weighted_rows(turned, column_start, column_weights, sums)
-    for j in range(sums.shape[0]):
-        for i in range(sums.shape[1]):
-            out[i, j] = np.float32(sums[j, i]) * scale
+    """Two or four lines side by side in 64 bits, `bits` each, which no sum passes: they are added up as one.
+
+    `line` and `words` (W,) and `sums` (w,) are room to work in, small enough for the first cache.
+    """
+    together, mask = 64 // bits, np.uint64((1 << bits) - 1)
+    for first in range(0, out.shape[0], together):
+        many = min(together, out.shape[0] - first)
+        words[:] = 0
+        for k in range(many):
+            _masked_row(canvas, row_start[first + k], row_weights[first + k], line)
+            _put_beside(line, np.uint64(bits * k), words)
+        _weighted_words(words, column_start, column_weights, sums)
+        for k in range(many):
+            to, shift = out[first + k], np.uint64(bits * k)
+            for j in range(len(sums)):
+                to[j] = np.float32(sums[j] >> shift & mask) * scale
 
 
 @njit(cache=True)
-def _masked_rows(canvas: Any, start: Any, weights: Any, out: Any) -> None:
+def _masked_row(canvas: Any, start: Any, weights: Any, line: Any) -> None:
     """-1 has all bits set: a mask costs less than a product, and keeps the sums as narrow as the weights."""
-    taps = weights.shape[1]
-    for i in range(out.shape[0]):
-        line = out[i]
-        line[:] = 0
-        for tap in range(0, taps - 1, 2):
-            weight, source = weights[i, tap], canvas[start[i] + tap]
-            second, below = weights[i, tap + 1], canvas[start[i] + tap + 1]
-            for x in range(len(line)):
-                line[x] += (weight & source[x]) + (second & below[x])
-        if taps % 2:
-            weight, source = weights[i, taps - 1], canvas[start[i] + taps - 1]
-            for x in range(len(line)):
-                line[x] += weight & source[x]
+    line[:] = 0
+    for tap in range(0, len(weights) - 1, 2):
+        weight, source = weights[tap], canvas[start + tap]
+        second, below = weights[tap + 1], canvas[start + tap + 1]
+        for x in range(len(line)):
+            line[x] += (weight & source[x]) + (second & below[x])
+    if len(weights) % 2:
+        weight, source = weights[-1], canvas[start + len(weights) - 1]
+        for x in range(len(line)):
+            line[x] += weight & source[x]
+
+
+@njit(cache=True)
+def _put_beside(line: Any, shift: Any, words: Any) -> None:
+    for x in range(len(line)):
+        words[x] |= np.uint64(line[x]) << shift
+
+
+@njit(cache=True)
+def _weighted_words(words: Any, start: Any, weights: Any, sums: Any) -> None:
+    for j in range(len(sums)):
+        first, total = np.uint64(start[j]), np.uint64(0)
+        for tap in range(weights.shape[1]):
+            total += weights[j, tap] * words[first + np.uint64(tap)]
+        sums[j] = total
 
 
 @njit(cache=True)
@@ -183,10 +203,3 @@ def _weighted_rows(canvas: Any, start: Any, weights: Any, out: Any) -> None:
             weight, source = weights[i, taps - 1], canvas[start[i] + taps - 1]
             for x in range(len(line)):
                 line[x] += weight * source[x]
-
-
-@njit(cache=True)
-def _turn(lines: Any, turned: Any) -> None:
-    for j in range(turned.shape[0]):
-        for i in range(turned.shape[1]):
-            turned[j, i] = lines[i, j]

@@ -42,7 +42,9 @@ class Averager:
         self._keep(image, t_us)
         if len(taken) == 1:
             return image
-        total = np.sum(taken, axis=0, dtype=np.uint16)
+        total = image.astype(np.uint16)
+        for other in taken[1:]:
+            total += other
         return np.asarray((total + len(taken) // 2) // len(taken), np.uint8)
 
     def _keep(self, image: Images, t_us: int) -> None:

@@ -8,12 +8,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from evplace.core.errors import OutputError
 from evplace.core.storage import new_file
 
 GAP = 4
 """Pixels between two images."""
 FILMS = (".webp", ".gif")
 """How the name of a film ends."""
+
+PICTURES = (".png", ".jpg", ".jpeg")
+"""How that of a picture ends."""
 
 Picture = NDArray[np.uint8]
 """(h, w, 3)."""
@@ -63,6 +67,12 @@ def write_film(pictures: Sequence[Picture], path: str | Path, fps: int, overwrit
     with new_file(path, overwrite) as partial:
         pause = round(1000 / fps)
         first.save(partial, save_all=True, append_images=others, duration=pause, loop=0, quality=50)
+
+
+def check_ending(path: Path, endings: Sequence[str], what: str) -> None:
+    """OutputError where a name is not that of `what` ("a film"): for saying so before the work."""
+    if path.suffix.lower() not in endings:
+        raise OutputError(f"{path} is no name of {what}: let it end in {', '.join(endings)}")
 
 
 def as_shown(image: NDArray[np.uint8], events: bool) -> Picture:

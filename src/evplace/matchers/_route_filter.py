@@ -176,10 +176,10 @@ def read(belief: Floats, z: NDArray[np.float32], way: Floats, xy: Floats, reach:
         if abs(way[r] - centre) < abs(way[item] - centre):
             item = r
     out[0] = most
-    beside, elsewhere, top = -1e9, -1e9, 0
+    beside, elsewhere, top, highest = -1e9, -1e9, 0, z[0]
     for r in range(n):
-        if z[r] > z[top]:
-            top = r
+        if z[r] > highest:
+            top, highest = r, z[r]
         if z[r] > beside and abs(way[r] - way[item]) < reach[1]:
             beside = z[r]
         if z[r] > elsewhere and _apart(way, xy, r, item) > reach[3]:

@@ -69,10 +69,10 @@ def _upper_floors(
     across = pulse(column, fc, 0.5 - wide * 0.5, wide)
     pane = across * pulse(storey, fr, 0.5 - tall * 0.5, tall) * inside
     i, j = math.floor(column), math.floor(storey)
-    if hash01(i, j, seed + 77) > 0.92:
+    if pane > 0.0 and hash01(i, j, seed + 77) > 0.92:
         pane = 0.0  # bricked up
     style = int(look[STYLE])
-    if style == 3 or (style == 0 and hash01(i, 3, seed) < 0.4):
+    if across > 0.0 and (style == 3 or (style == 0 and hash01(i, 3, seed) < 0.4)):
         sill = across * pulse(storey, fr, max(0.5 - tall * 0.5 - 0.22, 0.0), 0.2) * inside
         grey = 0.18 if style == 3 else 0.75
         colour = mix(colour, (grey, grey, grey), sill)
@@ -81,7 +81,8 @@ def _upper_floors(
     )
     trim = (look[TRIM], look[TRIM], look[TRIM])
     colour = mix(colour, trim, max(around * inside - pane, 0.0))
-    colour, shine = _window(look, i, j, column, fc, fr, pane, light, colour, shine)
+    if pane > 0.0:
+        colour, shine = _window(look, i, j, column, fc, fr, pane, light, colour, shine)
     cornice = band(v, fv, look[HEIGHT] - CORNICE_M, look[HEIGHT])
     return mix(colour, scale(trim, 0.8), cornice), shine
 

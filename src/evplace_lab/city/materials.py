@@ -52,15 +52,19 @@ def road(look: Look, s: float, t: float, fs: float, ft: float, snow: float) -> C
     along_y = abs(off_x) < HALF_ROAD_M
     along_x = abs(off_y) < HALF_ROAD_M
     paint = 0.0
-    tracks = 0.3
     if along_y and not along_x:
         paint = _markings(off_x, y, abs(off_y), fx, fy, look[9])
-        tracks = _wheel_tracks(off_x, fx)
     elif along_x and not along_y:
         paint = _markings(off_y, x, abs(off_x), fy, fx, look[10])
-        tracks = _wheel_tracks(off_y, fy)
     bare = mix(scale(colour_of(look), _asphalt(x, y, max(fx, fy))), (0.62, 0.62, 0.58), paint)
-    return mix(bare, WHITE, snow * (1.0 - 0.85 * tracks)) if snow > 0.0 else bare
+    if snow == 0.0:
+        return bare
+    tracks = 0.3
+    if along_y and not along_x:
+        tracks = _wheel_tracks(off_x, fx)
+    elif along_x and not along_y:
+        tracks = _wheel_tracks(off_y, fy)
+    return mix(bare, WHITE, snow * (1.0 - 0.85 * tracks))
 
 
 @compiled

@@ -131,9 +131,9 @@ def placed(parts: Primitives, position: ArrayLike, angle: float) -> Primitives:
     """`parts`, built at the origin facing +x, moved to `position` and turned by `angle` about z."""
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    frame = parts.frame.copy()
-    frame[:, 0:3] = parts.frame[:, 0:3] @ turn.T + np.asarray(position, float)
-    flat = parts.shape != SPHERE
-    frame[flat, 3:6] = parts.frame[flat, 3:6] @ turn.T
-    frame[:, 6:9] = parts.frame[:, 6:9] @ turn.T
-    return parts._replace(frame=frame, normal=parts.normal @ turn.T)
+    turned = np.concatenate([parts.frame.reshape(-1, 3), parts.normal]) @ turn.T
+    frame, normal = turned[: -len(parts.normal)].reshape(-1, 9), turned[-len(parts.normal) :]
+    frame[:, 0:3] += position
+    balls = parts.shape == SPHERE
+    frame[balls, 3:6] = parts.frame[balls, 3:6]
+    return parts._replace(frame=frame, normal=normal)

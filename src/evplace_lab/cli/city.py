@@ -23,7 +23,7 @@ from evplace.cli._output import print_json, progress, say
 from evplace.cli._settings import SettingsFlags
 from evplace.cli._workers import WorkerFlags
 from evplace.core.errors import SettingsError
-from evplace.imaging.sheets import FILMS
+from evplace.imaging.sheets import FILMS, PICTURES, check_ending
 from evplace_lab.city import CitySettings, generate, moving_preview, preview
 
 
@@ -43,7 +43,8 @@ class Args(WorkerFlags, SettingsFlags):
 def run(args: Args) -> int:
     """Make the drives that are not there yet, or a picture of some."""
     if args.preview is not None:
-        picture = moving_preview if args.preview.suffix in FILMS else preview
+        check_ending(args.preview, (*PICTURES, *FILMS), "a picture")
+        picture = moving_preview if args.preview.suffix.lower() in FILMS else preview
         picture(args.preview, args.city.seed, args.city.conditions)
         return 0
     if args.out is None:

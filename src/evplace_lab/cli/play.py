@@ -21,11 +21,11 @@ import tyro
 
 from evplace.cli._output import note, print_json, progress, say
 from evplace.cli._recording import DriveFlags
-from evplace.core.errors import InputError, OutputError, SettingsError
+from evplace.core.errors import InputError, SettingsError
 from evplace.core.storage import check_new_file
 from evplace.evaluation import ItemImages, Result
 from evplace.evaluation._evaluate import item_images
-from evplace.imaging.sheets import FILMS, write_film
+from evplace.imaging.sheets import FILMS, check_ending, write_film
 from evplace.imaging.traverse import Traverse
 from evplace.placemap import PlaceMap
 from evplace_lab.report._film import FPS, film
@@ -83,8 +83,7 @@ def _check(args: Args, out: Path) -> None:
         raise SettingsError(
             f"--seconds is how long the film lasts, up to {LONGEST_S:.0f}, not {args.seconds:g}"
         )
-    if out.suffix not in FILMS:
-        raise OutputError(f"{out} is no name of a film: let it end in {' or '.join(FILMS)}")
+    check_ending(out, FILMS, "a film")
     check_new_file(out, args.overwrite)
 
 

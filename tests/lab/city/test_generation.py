@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from evplace.cli import main
 from evplace.core.errors import OutputError, SettingsError
 from evplace.core.events import Events
 from evplace.core.settings import to_dict
@@ -228,3 +229,8 @@ def test_previews_can_be_looked_at(tmp_path: Path) -> None:
     moving_preview(tmp_path / "drive.webp", conditions=("day",), seconds=0.4, size=(40, 30))
     with Image.open(tmp_path / "drive.webp") as film:
         assert film.n_frames == 6  # type: ignore[attr-defined]
+
+
+def test_a_preview_of_another_ending_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["city", "--preview", f"{tmp_path}/sheet.xyz"]) == 2
+    assert "sheet.xyz is no name of a picture: let it end in .png" in capsys.readouterr().err

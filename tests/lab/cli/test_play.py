@@ -65,7 +65,10 @@ def test_what_does_not_belong_together_is_one_line(made: Path, tmp_path: Path, c
         ([result, street, other[0]], "is a result of another drive than"),
         ([result, f"{tmp_path}/other.evp", night], "is a result of another map than"),
         ([street, street, night], "is a map"),
-        ([result, street, night, "-o", f"{tmp_path}/film.avi"], "let it end in .webp or .gif"),
+        (
+            [result, street, night, "-o", f"{tmp_path}/film.avi"],
+            "is no name of a film: let it end in",
+        ),
         ([result, street, night, "--seconds", "0"], "--seconds is how long the film lasts"),
     ):
         assert main(["play", "-o", f"{tmp_path}/film.webp", *named]) == 2, named

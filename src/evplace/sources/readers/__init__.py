@@ -148,6 +148,11 @@ def _found(path: Path, head: bytes, table: bool = False) -> str:
         raise UnsupportedError(f"{path} is {what}")
     if (told := instead(path)) is not None:
         raise RecordingError(told)
+    for log in families.recognising("tracks", lambda part: bool(head) and part.recognises(head), []):
+        raise RecordingError(
+            f"{path} is a log of positions ({log}), not a recording: give it as the `track` of one; evplace "
+            "doctor examines it alone"
+        )
     known, what = ", ".join(families.names("readers")), "the folder" if path.is_dir() else "the content"
     raise RecordingError(
         f"{path}: {what} is of no known recording format: known are {known}{families.besides(faults)}"
