@@ -273,6 +273,14 @@ def test_code_depends_on_what_other_modules_hold(name: str, monkeypatch: pytest.
     assert _code_files.name_of(evt3._decode, ()) != before
 
 
+def test_code_depends_on_which_constant_has_which_value(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = _code_files.name_of(evt3._decode, ())
+    stored, marked = _canvas.STORED, _canvas.MARKED
+    monkeypatch.setattr(_canvas, "STORED", marked)
+    monkeypatch.setattr(_canvas, "MARKED", stored)
+    assert _code_files.name_of(evt3._decode, ()) != before
+
+
 def test_code_depends_on_options(monkeypatch: pytest.MonkeyPatch) -> None:
     before = _code_files.name_of(filled, ())
     monkeypatch.setitem(filled.options, "error_model", "numpy")
