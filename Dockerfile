@@ -4,7 +4,7 @@
 #   docker run --rm -v "$PWD:/data" -p 8000:8000 -e EVPLACE_TOKEN evplace serve --map campus.evp --source night.aedat4 --host 0.0.0.0
 FROM python:3.12-slim AS build
 WORKDIR /src
-COPY pyproject.toml README.md LICENSE ./
+COPY pyproject.toml setup.py README.md LICENSE ./
 COPY src src
 RUN python -m venv /opt/evplace && /opt/evplace/bin/pip install --no-cache-dir '.[report,hdf5,parquet,video,web]' \
     && /opt/evplace/bin/python -m evplace_lab.cli.precompile

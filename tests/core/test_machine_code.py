@@ -65,12 +65,21 @@ def half_of(number: int, by: int) -> float:
     return number / by
 
 
+@njit(cache=True)
+def bounds(values: np.ndarray) -> tuple[int, int]:
+    """A loop that returns two numbers."""
+    low, high = np.int64(values[0]), np.int64(values[0])
+    for value in values:
+        low, high = min(low, value), max(high, value)
+    return low, high
+
+
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder for what is kept; loops know of no entry yet, and none comes with the package."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(_code_files, "SHIPPED", tmp_path / "shipped")
-    for loop in (weighed, filled, within, doubled, half_of):
+    for loop in (weighed, filled, within, doubled, half_of, bounds):
         monkeypatch.setattr(loop, "_entries", {})
     return tmp_path / "evplace" / _code_files._environment()
 
@@ -85,6 +94,8 @@ def test_it_says_what_numba_says_of_all_kinds_of_arguments(monkeypatch: pytest.M
     assert found == [weighed.dispatcher(Pair(values, None), *others) for values, *others in calls]
     assert within(((0.5, 4), 7), small.ravel()) == 3 + 7
     assert all(within._entries.values())
+    assert bounds(np.array([3, -(1 << 40), 5])) == (-(1 << 40), 5)
+    assert all(bounds._entries.values())
 
 
 def test_what_is_not_plain_is_called_by_numba() -> None:
@@ -259,6 +270,14 @@ def test_code_depends_on_what_other_modules_hold(name: str, monkeypatch: pytest.
     """A decoder reaches both by what is said to numba before it is compiled."""
     before = _code_files.name_of(evt3._decode, ())
     monkeypatch.setattr(_checks if name == "JUMP_US" else _canvas, name, 5)
+    assert _code_files.name_of(evt3._decode, ()) != before
+
+
+def test_code_depends_on_which_constant_has_which_value(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = _code_files.name_of(evt3._decode, ())
+    stored, marked = _canvas.STORED, _canvas.MARKED
+    monkeypatch.setattr(_canvas, "STORED", marked)
+    monkeypatch.setattr(_canvas, "MARKED", stored)
     assert _code_files.name_of(evt3._decode, ()) != before
 
 

@@ -77,7 +77,8 @@ def keep(name: str, code: Code) -> None:
 def name_of(loop: Any, kinds: Iterable[Any]) -> str | None:
     """Which loop it is, for which arguments; then of which source, or None where no file has that."""
     stem = f"{loop.__module__.rpartition('.')[2]}.{loop.__name__}"
-    what = _digest(str(word) for word in (FORMAT, DATA, sys.platform, os.uname().machine, *kinds))
+    machine = (FORMAT, DATA, sys.platform, os.uname().machine)
+    what = _digest(map(str, (loop.__module__, *machine, *kinds)))
     try:
         return f"{stem}-{what}.{_digest(_sources(loop, kinds))}"
     except OSError:
@@ -96,17 +97,17 @@ def _digest(words: Iterable[str]) -> str:
 def _sources(loop: Any, kinds: Iterable[Any]) -> list[str]:
     """All that a loop reaches: files by their checksums, constants by their values, and its options."""
     found = {
-        f"{name} {sorted(value) if name == 'fastmath' else value}" for name, value in loop.options.items()
+        f"{name} {sorted(value) if isinstance(value, set) else value}" for name, value in loop.options.items()
     }
     seen: set[Any] = set()
-    waiting = [loop, *filter(inspect.isclass, kinds)]
+    waiting = [("", value) for value in (loop, *filter(inspect.isclass, kinds))]
     while waiting:
-        value = waiting.pop()
+        name, value = waiting.pop()
         if isinstance(value, CONSTANTS):
-            found.add(str(value.tolist() if isinstance(value, np.generic | np.ndarray) else value))
+            found.add(f"{name} {value.tolist() if isinstance(value, np.generic | np.ndarray) else value}")
         elif _is_ours(value, loop) and value not in seen:
             seen.add(value)
-            found.add(_checksum_of(getattr(sys.modules[value.__module__], "__file__", "")))
+            found.add(_checksum_of(getattr(sys.modules.get(value.__module__), "__file__", "") or ""))
             waiting += _used_by(value)
     return sorted(found)
 
@@ -116,12 +117,12 @@ def _is_ours(value: Any, loop: Any) -> bool:
     return callable(value) and (module == loop.__module__ or module.startswith("evplace"))
 
 
-def _used_by(value: Any) -> Iterator[Any]:
+def _used_by(value: Any) -> Iterator[tuple[str, Any]]:
     """The function in a compiled loop, and what is called before it is compiled; what a function names."""
     if hasattr(value, "loop"):
-        yield from (value.loop, value.before)
+        yield from (("", value.loop), ("", value.before))
     elif inspect.isfunction(function := inspect.unwrap(value)):
-        yield from (function.__globals__.get(name) for name in _names(function.__code__))
+        yield from ((name, function.__globals__.get(name)) for name in _names(function.__code__))
 
 
 def _names(code: CodeType) -> Iterator[str]:

@@ -14,7 +14,7 @@ from made import encoded, libcaer_words, mono_words, ros1_bag, ros2_bag, some_ev
 
 from evplace.core.errors import DamagedRecordingError, RecordingError, UnsupportedError
 from evplace.core.events import Events
-from evplace.sources.readers import open_recording
+from evplace.sources.readers import _ros_encodings, open_recording
 from evplace.sources.readers._ros_encodings import ENCODINGS
 
 DEFINITION = """std_msgs/Header header
@@ -187,3 +187,10 @@ def test_an_unknown_encoding_is_an_error_that_names_the_known(tmp_path: Path) ->
     path = ros1_bag(tmp_path, "event_camera_msgs/EventPacket", [encoded("evt9", 0, b"\0" * 8)])
     with pytest.raises(UnsupportedError, match=r"evt9.*known are evt3, mono, libcaer, libcaer_cmp"):
         open_recording(path)
+
+
+def test_words_lie_as_loops_are_compiled_for() -> None:
+    """Whatever byte of a bag a message begins at."""
+    words = _ros_encodings._words(memoryview(b"\0\1\0\2\0")[1:], "<u2")
+    assert words.tolist() == [1, 2]
+    assert words.flags.aligned
