@@ -243,6 +243,11 @@ def test_small_images_are_refused() -> None:
         )
 
 
+def test_a_network_too_large_to_be_saved_is_refused_before_it_is_made() -> None:
+    with pytest.raises(SettingsError, match=r"12000 places has .* million weights, at most 500 .* larger"):
+        Network(12_000, (1, 45, 80), NetworkSettings())
+
+
 def test_one_place_only_is_learned(day: Traverse) -> None:
     assert day.track is not None
     one = PlaceGrid.from_track(day.track, cell_m=1e6)

@@ -29,6 +29,8 @@ except ModuleNotFoundError as error:
 
 Weights = dict[str, NDArray[np.float32]]
 CHANNELS = (6, 16, 32)
+MOST_WEIGHTS = 500_000_000
+"""A graph of more would pass the 2 GB that ONNX can hold in one file."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class Network(nn.Module):
         self.norm2 = nn.BatchNorm2d(second, eps=1e-5, momentum=0.1)
         self.conv3 = nn.Conv2d(second, third, 5, padding=2)
         flat = third * (height // 8) * (width // 8)
+        _check_size(places, flat)
         self.full1 = nn.Linear(flat, 2 * places)
         self.full2 = nn.Linear(2 * places, int(1.5 * places))
         self.full3 = nn.Linear(int(1.5 * places), places)
@@ -83,6 +86,16 @@ class Network(nn.Module):
         x = torch.relu(self.full2(self.dropout(x)))  # (n, 1.5N)
         logits: Tensor = self.full3(self.dropout(x))  # (n, N)
         return torch.relu(logits) if self.last_relu else logits
+
+
+def _check_size(places: int, flat: int) -> None:
+    """SettingsError where the fully connected layers would be too large to be saved."""
+    weights = 2 * places * flat + 3 * places**2 + 3 * places**2 // 2
+    if weights > MOST_WEIGHTS:
+        raise SettingsError(
+            f"a network of {places} places has {weights / 1e6:.0f} million weights, at most "
+            f"{MOST_WEIGHTS / 1e6:.0f} can be saved: make the places larger"
+        )
 
 
 def scaled(images: Tensor) -> Tensor:
