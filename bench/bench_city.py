@@ -1,9 +1,8 @@
-"""Frames of the city a second of CPU, whole drives with three sensors.
+"""Frames of the city a second of CPU: python bench/bench_city.py [--before CHECKOUT]
 
-    python bench/bench_city.py [--before CHECKOUT]
-
-160x120 as the benchmark is made: rendering, sensors, images and writing; the time before the first image,
-which builds the town, is left out. With another checkout, both make the same drives in alternation.
+Whole drives at 160x120 with three sensors, as the benchmark is made: rendering, events, images, writing. The
+time before the first image, which builds the town, is left out. With another checkout, both make the same
+drives in alternation.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from harness import Timing, processor, report
 
 CONDITIONS = ("day", "night", "rain", "dusk")
 LENGTH_M = 100.0
-ROUNDS = 5
+ROUNDS = 3
 
 
 def seconds_a_frame(name: str) -> float:

@@ -29,7 +29,7 @@ from evplace_lab.city.conditions import CONDITIONS
 from evplace_lab.city.culling import CELL_M, Groups, draw_groups, group, seen
 from evplace_lab.city.drive import Pose
 from evplace_lab.city.film import EAST, NORTH, TURN, ZONE, geo_pose, view_of
-from evplace_lab.city.mesh import SPHERE, Mesh, Primitives
+from evplace_lab.city.mesh import SPHERE, Mesh, Primitives, join
 from evplace_lab.city.plan import CitySettings, drive_name, drive_number
 from evplace_lab.city.raster import FAR_M, Buffers, View, clear, draw, is_hidden
 
@@ -110,6 +110,15 @@ def scattered(seed: int, count: int = 400, reach: float = 450.0) -> Primitives:
     return mesh.primitives()
 
 
+def crowded(seed: int) -> Primitives:
+    """Houses, behind which most is hidden, and smaller things between them."""
+    mesh, rng = Mesh(), np.random.default_rng(seed)
+    for _ in range(30):
+        middle = (*rng.uniform(-50, 50, 2), 0.0)
+        mesh.box(middle, tuple(rng.uniform(3, 7, 2)), rng.uniform(4, 20), rng.uniform(0, 3), 3, (1, 1, 1))
+    return join([mesh.primitives(), scattered(seed, 100, 50.0)])
+
+
 def primitives_of(groups: Groups, chosen: NDArray[np.int64]) -> NDArray[np.int32]:
     return np.concatenate([groups.members[groups.start[g] : groups.start[g + 1]] for g in chosen])
 
@@ -146,15 +155,15 @@ def front_of_each_alone(scene: Primitives, view: View) -> NDArray[np.int64]:
 
 @settings(max_examples=30)
 @given(st.floats(-3.1, 3.1), st.floats(-20, 20), st.floats(-20, 20), st.booleans())
-def test_nothing_that_is_in_front_is_left_out(yaw: float, x: float, y: float, crowded: bool) -> None:
-    scene = CROWDED if crowded else SCATTERED
+def test_nothing_that_is_in_front_is_left_out(yaw: float, x: float, y: float, is_crowded: bool) -> None:
+    scene = CROWDED if is_crowded else SCATTERED
     view = view_of(Pose(x, y, 1.5, yaw, 0.0, 0.0, 0.0, 0.0, 0.0), 19.0, (32, 24))
     buffers = Buffers.of((32, 24), len(scene.shape))
     draw_groups(scene, group(scene), view, buffers)
     np.testing.assert_array_equal(buffers.front, front_of_each_alone(scene, view))
 
 
-SCATTERED, CROWDED = scattered(7), scattered(8, 200, 60.0)
+SCATTERED, CROWDED = scattered(7), crowded(8)
 
 
 def test_what_lies_behind_a_wall_is_hidden_but_not_beside_it() -> None:
