@@ -117,7 +117,7 @@ def test_flags_of_a_track_need_one(recording: Path, capsys: Capture, flag: tuple
     assert "need a --track" in images(capsys, recording, *flag, code=2)[1][0]
 
 
-@pytest.mark.parametrize("log", [rmc_log, csv_log])
+@pytest.mark.parametrize("log", [rmc_log, gpx_log])
 def test_a_log_that_is_taken_for_a_recording_is_named(
     tmp_path: Path, capsys: Capture, log: Callable[[Log], str]
 ) -> None:
