@@ -12,8 +12,8 @@ from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap, remembered
 
 NOT_MEASURED = (
-    "the map could not be measured on itself (it is shorter than 150 m or has fewer than 50 images): matches "
-    "have no probability, and none is rejected"
+    "the map could not be measured on itself (it is shorter than 150 m, without positions 15 s, or has fewer "
+    "than 50 images): matches have no probability, and none is rejected"
 )
 """Said of a map whose matcher is calibrated where that can be."""
 
