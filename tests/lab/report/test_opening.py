@@ -14,7 +14,7 @@ from made_results import make_result
 from evplace.evaluation import Result
 from evplace.matchers import Path as Answers
 from evplace_lab.report import report
-from evplace_lab.report._pictures import _are_events, _stretched
+from evplace_lab.report._pictures import _stretched, are_events
 
 
 def data_of(page: str) -> dict[str, Any]:
@@ -45,8 +45,9 @@ def test_images_of_few_counts_are_stretched() -> None:
     assert _stretched(image).max() == 255
     assert _stretched(image)[2, 2] == 85
     assert not _stretched(np.zeros((2, 2), np.uint8)).any()
-    assert _are_events({"map": {"recipe": {"kind": "events"}}})
-    assert not _are_events({"map": {"recipe": None}})
+    made = make_result()
+    for recipe, events in (({"kind": "events"}, True), (None, False)):
+        assert are_events(dataclasses.replace(made, settings={"map": {"recipe": recipe}})) is events
 
 
 def nothing_accepted() -> Result:
