@@ -148,7 +148,8 @@ def _found(path: Path, head: bytes, table: bool = False) -> str:
         raise UnsupportedError(f"{path} is {what}")
     if (told := instead(path)) is not None:
         raise RecordingError(told)
-    logs = families.recognising("tracks", lambda part: bool(head) and part.recognises(head), [])
+    lines = b"\n" in head.strip()
+    logs = families.recognising("tracks", lambda part: lines and part.recognises(head), [])
     for log in (name for name in logs if name != "csv"):  # which any text with a comma may be
         raise RecordingError(
             f"{path} is a log of positions ({log}), not a recording: give it as the `track` of one; evplace "
