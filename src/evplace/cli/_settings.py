@@ -122,7 +122,7 @@ class Part:
         sources = dict.fromkeys(changed, f"preset {getattr(args, self.preset, None)}")
         sources |= dict.fromkeys(of_file, file) | {name: "flag" for name, _ in given[len(of_file) :]}
         # What is made of settings is a dataclass, which its type does not say.
-        names = [field.name for field in dataclasses.fields(made)]  # type: ignore[arg-type]
+        names = [field.name for field in dataclasses.fields(made)]  # type: ignore[arg-type]  # a dataclass
         return {f"{self.pairs}.{name}": (getattr(made, name), sources.get(name, "default")) for name in names}
 
     def _preset(self, args: Any) -> object | None:

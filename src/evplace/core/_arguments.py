@@ -24,7 +24,9 @@ NUMBERS = frozenset("?bBhHiIlLqQfd")
 """Types of numbers that arrays may hold."""
 
 
-class _Two(ctypes.c_int64 * 2):  # type: ignore[misc]
+class _Two(ctypes.c_int64 * 2):  # type: ignore[misc]  # a class, which mypy takes for a product
+    """Two numbers, whose `value` is a tuple as that of one is a number."""
+
     @property
     def value(self) -> tuple[int, ...]:
         return tuple(self)

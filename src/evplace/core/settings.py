@@ -40,6 +40,7 @@ def make(kind: type[S], values: Mapping[str, object], base: S | None = None, tab
     """
     # `kind` is a dataclass, which a TypeVar cannot say: hence the exceptions to the types below.
     hints = get_type_hints(kind)
+    # A dataclass, which mypy cannot know here.
     known = {field.name: hints[field.name] for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
     check_keys(values, known, table)
     checked: dict[str, Any] = {}
@@ -51,6 +52,7 @@ def make(kind: type[S], values: Mapping[str, object], base: S | None = None, tab
             checked[key] = make(known[key], value, getattr(base, key, None), name)
         else:
             raise SettingsError(f"the setting '{name}' cannot be {value!r}: it is a table, [{name}]")
+    # A dataclass, which mypy cannot know here.
     return kind(**checked) if base is None else dataclasses.replace(base, **checked)  # type: ignore[type-var]
 
 
@@ -82,12 +84,13 @@ def preset_of(what: str, presets: Mapping[str, S], name: str | None) -> S | None
 def changed(settings: object) -> list[str]:
     """The fields of a dataclass that differ from its defaults."""
     plain = type(settings)()  # a dataclass, which `object` does not say
-    names = [field.name for field in dataclasses.fields(plain)]  # type: ignore[arg-type]
+    names = [field.name for field in dataclasses.fields(plain)]  # type: ignore[arg-type]  # a dataclass
     return [name for name in names if getattr(settings, name) != getattr(plain, name)]
 
 
 def to_dict(settings: object) -> dict[str, Any]:
     """The resolved settings, a dataclass of any kind, as plain values, ready for JSON."""
+    # A dataclass, which mypy cannot know here.
     plain: dict[str, Any] = json.loads(json.dumps(dataclasses.asdict(settings)))  # type: ignore[call-overload]
     return plain
 

@@ -94,6 +94,7 @@ class Traverse:
             mask = read_array(folder / "mask.npy", what) if masked else None
             track = _load_track(folder, t_us, about.get("track"), what)
             # Its own checks refuse an `info` of another kind.
+            # Checked there, which mypy cannot know here.
             return cls(images, t_us, counts, track, recipe, about.get("info"), mask)  # type: ignore[arg-type]
         except SettingsError as error:
             raise TraverseError(f"{what} is damaged: {error}") from error
