@@ -33,7 +33,7 @@ from evplace.matchers import State as StateOfAnswer
 from evplace.matchers._checks import check_answer
 from evplace.matchers._parts import InParts
 from evplace.placemap import PlaceMap, default_matcher
-from evplace.scorers import ComparesSome, OpenScorer, Rows
+from evplace.scorers import ComparesSome, OpenScorer, Rows, Verifies
 from evplace.sources.cleaning import MaskSource, read_mask
 from evplace.sources.readers import Canvas
 from evplace.sources.tracks import Track
@@ -188,8 +188,8 @@ class Localizer:
         self._times_us[self._stepped] = t_us, region.compared
         with families.blaming("matchers", self.matcher):
             wanted = self._following.within(region.items)
-        row = self.rows(mean[None])[0] if wanted is None else self.row_of(mean, wanted)
-        yield from self._matches(self._step(row, seen))
+        rows, told = self._scored(mean[None], [seen], wanted)
+        yield from self._matches(self._step(rows[0], told[0]))
 
     def match_traverse(self, traverse: Traverse) -> Iterator[Match]:
         """The matches of a traverse's images, as `push` would give them for its events.
@@ -209,11 +209,7 @@ class Localizer:
 
         PlaceMapError where they have not the shape of the map's.
         """
-        if images.shape[1:] != self.map.image_shape:
-            raise PlaceMapError(
-                f"the map was made from images of shape {self.map.image_shape}, these are "
-                f"{images.shape[1:]}: make them with the map's recipe"
-            )
+        self._check_shape(images)
         with families.blaming("scorers", self.map.scorer):
             rows = self.scorer.rows(images)
         check_rows(rows, len(images), self.map)
@@ -251,14 +247,35 @@ class Localizer:
         rows, seen = empty_rows(len(query), len(self.map.items)), list[Seen]()
         for start in range(0, len(query), BLOCK):
             part = np.arange(start, min(start + BLOCK, len(query)))
-            images, more = self._shown(query, part)
-            rows[part], seen = self.rows(images), seen + more
+            rows[part], more = self._scored(*self._shown(query, part))
+            seen += more
         return seen, rows
 
     def _shown(self, query: Traverse, part: NDArray[np.int64]) -> tuple[NDArray[np.uint8], list[Seen]]:
         """Some images of a traverse as the scorer is shown them, and what the matcher is told of them."""
         pairs = [self._seeing.see(np.asarray(query.images[at]), int(query.t_us[at])) for at in part]
         return np.stack([mean for mean, _ in pairs]), [one for _, one in pairs]
+
+    def _scored(
+        self, images: NDArray[np.uint8], seen: list[Seen], items: NDArray[np.int64] | None = None
+    ) -> tuple[Rows, list[Seen]]:
+        """(n, items) the scores of images as the scorer is shown them; `seen` is told what verifies."""
+        if not isinstance(self.scorer, Verifies):
+            return (self.rows(images) if items is None else self.row_of(images[0], items)[None]), seen
+        self._check_shape(images)
+        with families.blaming("scorers", self.map.scorer):
+            scored = self.scorer.scored(images, items)
+        for rows in scored:
+            check_rows(rows, len(images), self.map, None if items is None else len(items))
+        pairs = zip(seen, scored.verifying, strict=True)
+        return scored.rows, [one._replace(verifying=row) for one, row in pairs]
+
+    def _check_shape(self, images: NDArray[np.uint8]) -> None:
+        if images.shape[1:] != self.map.image_shape:
+            raise PlaceMapError(
+                f"the map was made from images of shape {self.map.image_shape}, these are "
+                f"{images.shape[1:]}: make them with the map's recipe"
+            )
 
     def _step(self, row: Rows, seen: Seen) -> list[Answer]:
         with families.blaming("matchers", self.matcher):

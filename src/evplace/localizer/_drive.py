@@ -63,6 +63,7 @@ class Answering:
         made = keep or at_once
         self.rows = empty_rows(len(query), len(localizer.map.items)) if rows is None and made else rows
         """(n, items), 0 for images without events; None where they are not kept."""
+        self._verifying: Rows | None = None
         with families.blaming("matchers", localizer.matcher):
             alone = not self._live and not at_once
             self._matching = localizer.matcher.start(localizer._distances) if alone else None
@@ -76,9 +77,10 @@ class Answering:
         block = 1 if self._live else BLOCK
         while self._done < len(self._filled):
             part = self._filled[self._done : self._done + block]
-            images, seen = self._of._shown(self._query, part)
-            rows = self._of.rows(images) if self._given is None else self._given[part]
-            if self.rows is not None and self._given is None:
+            rows, seen = self._of._scored(*self._of._shown(self._query, part))
+            if self._given is not None:
+                rows = self._given[part]
+            elif self.rows is not None:
                 self.rows[part] = rows
             self._take(rows, seen)
             self._done += len(part)
@@ -126,13 +128,22 @@ class Answering:
             with families.blaming("matchers", self._of.matcher):
                 self._matching.extend(rows)
         elif not self._live:
-            self._seen += seen
+            self._seen += [self._kept(one, len(self._seen) + at) for at, one in enumerate(seen)]
         else:
             for row, one in zip(rows, seen, strict=True):
                 at = self._of._stepped
                 answers = self._of._step(row, one)
                 self.delay = max([self.delay, *(at - answer.query for answer in answers)])
                 self._note(answers)
+
+    def _kept(self, seen: Seen, number: int) -> Seen:
+        """What was seen of an image, with what verifies in a table that need not lie in memory."""
+        if seen.verifying is None:
+            return seen
+        if self._verifying is None:
+            self._verifying = empty_rows(len(self._filled), len(seen.verifying))
+        self._verifying[number] = seen.verifying
+        return seen._replace(verifying=self._verifying[number])
 
     def _note(self, answers: list[Answer]) -> None:
         for answer in answers:

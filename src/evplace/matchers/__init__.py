@@ -129,6 +129,8 @@ class Seen(NamedTuple):
     content: float
     """How much its image shows: mean grey level of an event image, mean change of a camera image; NaN where
     that is not known."""
+    verifying: NDArray[np.float32] | None = None
+    """(items,) z-scores by one of the scorer's descriptors alone; None where it has but one."""
 
 
 Learned = Mapping[str, NDArray[Any]]
@@ -151,6 +153,8 @@ class Route(NamedTuple):
     own: Sequence[NDArray[np.int64]] | None = None
     """The item of each of the images that `learn` may ask rows of, for each drive of the map, one behind the
     other; None where these are the items' own, one each, and a row also says how like itself an image is."""
+    verifying: Callable[[slice], Rows] | None = None
+    """For `learn`: as its `rows`, the z-scores that verify (see Seen); None where there are none."""
     left_out: int = 0
     """Items of the map that these are not all of; then rows are z-scores by all of them."""
 

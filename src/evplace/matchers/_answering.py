@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 from evplace.matchers import _nearby as nearby
 from evplace.matchers import _route_filter as loops
 from evplace.matchers._belief import reaches
-from evplace.matchers._known import SIGNS, signs_of
+from evplace.matchers._known import signs_of
 from evplace.matchers._ways import Ways
 
 Floats = NDArray[np.float64]
+Scores = NDArray[np.float32]
 
+READ = 5
+"""What is read of a belief: see `loops.read`."""
 OTHERS = 5
 """Runners-up that are named, at most."""
 HELD = 1e-6
@@ -36,7 +39,7 @@ class Found(NamedTuple):
     mass: float
     """Belief in the stretch around it."""
     signs: Floats
-    """(SIGNS,) see `_known`."""
+    """(LATE_SIGNS,) see `_known`; (SIGNS,) where the speeds are known."""
 
 
 class Others(NamedTuple):
@@ -56,17 +59,23 @@ class Reader:
         self.ways = ways
         self._more = 1 + left_out / len(ways.way)
         self._reach = reaches(ways)
-        self._read = np.empty(SIGNS)
+        self._read = np.empty(READ)
         self._held, self._away = np.empty(len(ways.way), np.int64), np.empty(len(ways.way))
         self._bins = np.empty(nearby.BINS)
 
-    def find(self, belief: Floats, z: NDArray[np.float32]) -> Found:
-        """The item in the middle of the likeliest stretch."""
-        item = loops.read(belief, z, self.ways.way, self.ways.xy, self._reach, self._read)
+    def find(
+        self, belief: Floats, z: Scores, verifying: Scores | None = None, speeds: Floats | None = None
+    ) -> Found:
+        """The item in the middle of the likeliest stretch, by (references,) z-scores and those that verify.
+
+        Without these the z-scores themselves do. `speeds` (SPEEDS,) is the belief in each, where it is known.
+        """
+        second = z if verifying is None else verifying
+        item = loops.read(belief, z, second, self.ways.way, self.ways.xy, self._reach, self._read)
         mass = float(self._read[0])
         if self._more > 1:
             _among(self._more, self._read)
-        return Found(int(item), mass, signs_of(self._read))
+        return Found(int(item), mass, signs_of(self._read, speeds))
 
     def uncertainty_m(self, belief: Floats, item: int) -> float:
         """Radius around the item that holds LIKELY of the belief, but no less than half a step between items.
@@ -86,7 +95,7 @@ class Reader:
         least = max(HELD, NOTABLE * float(belief.max()))
         found, mass = np.empty(OTHERS, np.int64), np.empty(1)
         many = nearby.runners_up(
-            belief, self.ways.xy, item, least, self._reach[[0, 3]], self._held, found, mass
+            belief, self.ways.xy, item, least, self._reach[[0, 2]], self._held, found, mass
         )
         return Others(tuple(found[:many].tolist()), float(mass[0]))
 

@@ -87,6 +87,11 @@ class Filter:
         loops.share_out(self.belief.reshape(-1), self.belief.sum(), marginal)
         return marginal
 
+    @property
+    def speeds(self) -> Floats:
+        """(SPEEDS,) the belief in each class."""
+        return np.asarray(self.belief.sum(axis=0), np.float64)
+
     def go_on(self, before: Filter, came_from: NDArray[np.int64]) -> None:
         """From a filter over other items of the map; `came_from` as in `Continuing`.
 
@@ -150,8 +155,8 @@ def message_before(message: Floats, moment: Moment, ways: Ways) -> Floats:
 
 def reaches(ways: Ways) -> Floats:
     """(4,) metres for `loops.read`: wider where items lie far apart."""
-    least = np.array([15.0, 4.0, 10.0, APART_M])
-    return np.asarray(np.maximum(least, np.array([2.0, 1.1, 1.5, 4.0]) * ways.spacing), np.float64)
+    least = np.array([15.0, 4.0, APART_M, 2 * APART_M])
+    return np.asarray(np.maximum(least, np.array([2.0, 1.1, 4.0, 8.0]) * ways.spacing), np.float64)
 
 
 class Clock:
@@ -165,6 +170,8 @@ class Clock:
         """`usual` is what the map's own images show, where it is known: a drive may begin with a stop."""
         self.standing = False
         """Whether the last image said nothing new."""
+        self.slow = False
+        """Whether it came long after the one before it."""
         self._last_us: int | None = None
         self._driven_s = 0.0
         self._since_kept_s = 0.0
@@ -175,7 +182,7 @@ class Clock:
         """The weight of an image, and the seconds driven where the filter is to move before it."""
         seconds = 0.0 if self._last_us is None else max(seen.t_us - self._last_us, 0) * 1e-6
         new = 1.0 if self._last_us is None else _new(seconds)
-        self._last_us = seen.t_us
+        self._last_us, self.slow = seen.t_us, seconds >= FAR_APART_S
         active = self._active(seen.content, seconds)
         self.standing = active == 0.0
         self._driven_s += seconds * active

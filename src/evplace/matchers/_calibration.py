@@ -7,6 +7,7 @@ what the two layers then say of images from there is what they will say of place
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +28,9 @@ Ints = NDArray[np.int64]
 
 LIVE, LATE = "unknown_live", "unknown_late"
 """Probabilities, sorted, at places cut out: live, and when what comes later is known."""
+SLOW = "_slow"
+"""The end of the same names, of answers judged as those of a slow camera."""
+UNKNOWN = (LIVE, LATE, LIVE + SLOW, LATE + SLOW)
 OTHER_M = 25.0
 """References further away than this show another place."""
 CUT_M = (60.0, 150.0)
@@ -65,11 +69,12 @@ def measured(route: Route, rows: Callable[[slice], Rows], least: int = LEAST_UNK
     found = strangers(route, rows, least)
     if found is None:
         return {}
-    return {
-        **found.learned,
-        LIVE: np.sort(probability(found.live)),
-        LATE: np.sort(probability(found.late)),
+    said = {
+        name + (SLOW if slow else ""): np.sort(probability(features, slow))
+        for name, features in ((LIVE, found.live), (LATE, found.late))
+        for slow in (False, True)
     }
+    return {**found.learned, **said}
 
 
 def together(before: Learned, more: Learned) -> Learned:
@@ -79,7 +84,7 @@ def together(before: Learned, more: Learned) -> Learned:
     many = np.array([len(one[LIVE]) for one in (before, more)]) / (len(before[LIVE]) + len(more[LIVE]))
     wrong = np.log(many @ np.exp(np.stack([before[WRONG], more[WRONG]])))
     content = many @ np.stack([before[CONTENT], more[CONTENT]])
-    both = {name: np.sort(np.concatenate([before[name], more[name]])) for name in (LIVE, LATE)}
+    both = {name: np.sort(np.concatenate([before[name], more[name]])) for name in UNKNOWN}
     return {WRONG: wrong, CONTENT: content, **both}
 
 
@@ -91,14 +96,24 @@ def strangers(route: Route, rows: Callable[[slice], Rows], least: int = LEAST_UN
         return None
     drives = [np.arange(min(items, MOST_IMAGES))] if route.own is None else route.own
     at = np.concatenate(drives)
-    own = np.array(rows(slice(0, len(at))), np.float32)
-    if route.own is None:
-        own[at, at] = own.min(axis=1)  # an image tells nothing of itself
+    own = _of_others(rows, route, len(at))
+    verifying = None if route.verifying is None else _of_others(route.verifying, route, len(at))
     learned = {WRONG: _wrong(ways, own, at), CONTENT: np.array([route.content])}
-    each = list(zip(drives, np.split(own, np.cumsum([len(drive) for drive in drives])[:-1]), strict=True))
+    ends = np.cumsum([len(drive) for drive in drives])[:-1]
+    parts = [None] * len(drives) if verifying is None else np.split(verifying, ends)
+    each = list(zip(drives, np.split(own, ends), parts, strict=True))
     unknown = [_trial(route, ways, *one, learned, keep) for keep in _cuts(ways) for one in each]
     live, late = (np.concatenate(column) for column in zip(*unknown, strict=True))
     return None if len(live) < least else Strangers(learned, live, late)
+
+
+def _of_others(rows: Callable[[slice], Rows], route: Route, images: int) -> Rows:
+    """(images, items) rows of a map's own images, which tell nothing of themselves."""
+    found = np.array(rows(slice(0, images)), np.float32)
+    if route.own is None:
+        at = np.arange(images)
+        found[at, at] = found.min(axis=1)
+    return found
 
 
 def _wrong(ways: Ways, own: Rows, at: Ints) -> Floats:
@@ -124,11 +139,12 @@ def _cuts(ways: Ways) -> Iterator[Bools]:
 
 
 def _trial(
-    route: Route, whole: Ways, at: Ints, own: Rows, learned: Learned, keep: Bools
+    route: Route, whole: Ways, at: Ints, own: Rows, verifying: Rows | None, learned: Learned, keep: Bools
 ) -> tuple[Floats, Floats]:
     """(unknown, features) live and late, of those of a drive's images whose places are cut out."""
     part = Ways.of(_part(route, keep))
-    seen, rows = _driven(whole, at), own[:, keep]
+    rows = own[:, keep]
+    seen = _driven(whole, at, None if verifying is None else verifying[:, keep])
     unknown = np.array([not _near(whole, keep, item) for item in at])
     live, late = traces.live(part, rows, seen, learned), traces.late(part, rows, seen, learned)
     return (
@@ -148,11 +164,12 @@ def _near(whole: Ways, keep: Bools, item: int) -> bool:
     return bool((keep & (whole.away(item) <= NEAR_M) & ~(turn > LIKE_DEG)).any())
 
 
-def _driven(ways: Ways, at: Ints) -> list[Seen]:
+def _driven(ways: Ways, at: Ints, verifying: Rows | None) -> list[Seen]:
     """Images at some items, in their order, as a drive at the map's usual pace."""
     steps = np.abs(np.diff(ways.way[at])) / ways.pace
     t_us = np.concatenate([[0.0], np.cumsum(np.minimum(steps, 1.0))]) * 1e6
-    return [Seen(int(one), np.nan) for one in t_us]
+    rows = repeat(None) if verifying is None else verifying
+    return [Seen(int(time), np.nan, row) for time, row in zip(t_us, rows, strict=False)]
 
 
 def checked(learned: Learned | None) -> Learned:
@@ -162,10 +179,10 @@ def checked(learned: Learned | None) -> Learned:
     wrong, content = (np.asarray(learned.get(name)) for name in (WRONG, CONTENT))
     good = wrong.shape == around.GRID.shape and _are_finite(wrong) and content.shape == (1,)
     good = good and content.dtype == np.float64 and not (content < 0).any()
-    if not good or not all(_are_shares(np.asarray(learned.get(name))) for name in (LIVE, LATE)):
+    if not good or not all(_are_shares(np.asarray(learned.get(name))) for name in UNKNOWN):
         raise PlaceMapError(
-            "what the map has told of itself is damaged or missing in part: measure it again, with "
-            "evplace calibrate"
+            "what the map has told of itself is damaged, missing in part, or of an earlier evplace: measure "
+            "it again, with evplace calibrate"
         )
     return learned
 

@@ -45,15 +45,22 @@ class InParts:
         if self._items is None:
             return following.step(row, seen)
         usual, some = np.split(row, [len(self._usual)])
+        verifying = None if seen.verifying is None else seen.verifying[len(self._usual) :]
         if self._continuing:
+            seen = seen._replace(verifying=verifying)
             return self._of_map(following.step(z_by(usual, some), seen))
-        whole = np.full(len(self._route.position), some.min(), some.dtype)
-        whole[self._items] = some
-        return following.step(whole, seen)
+        seen = seen._replace(verifying=None if verifying is None else self._whole(verifying))
+        return following.step(self._whole(some), seen)
 
     def finish(self) -> list[Answer]:
         """See Following."""
         return [] if self._following is None else self._of_map(self._following.finish())
+
+    def _whole(self, some: Row) -> Row:
+        """(items of the map,) those that were not compared as the least alike."""
+        whole = np.full(len(self._route.position), some.min(), some.dtype)
+        whole[self._items] = some
+        return whole
 
     def _begin(self, items: Items | None) -> Following:
         following = follow(self._matcher, _part(self._route, items), self._distances)

@@ -148,12 +148,21 @@ def share_out(belief: Floats, total: float, out: Floats) -> None:
 
 
 @njit(cache=True, nogil=True)
-def read(belief: Floats, z: NDArray[np.float32], way: Floats, xy: Floats, reach: Floats, out: Floats) -> int:
+def read(
+    belief: Floats,
+    z: NDArray[np.float32],
+    verifying: NDArray[np.float32],
+    way: Floats,
+    xy: Floats,
+    reach: Floats,
+    out: Floats,
+) -> int:
     """What a belief (references,) says; returns the answer's item.
 
-    `reach` holds metres: of the stretch of way whose belief counts together, beside the answer, of agreement,
-    and where another place begins. `out` gets the belief of the stretch; the largest score beside the answer;
-    that at other places; and whether the largest score of all agrees with the answer.
+    `reach` holds metres: of the stretch of way whose belief counts together, beside the answer, where another
+    place begins, and beyond which it is all the same how far away belief lies. `out` gets the belief of the
+    stretch; the largest score beside the answer; that at other places; the largest one that verifies, beside
+    the answer; and how far from it the belief lies, in metres.
     """
     n = len(way)
     begin, end, mass, most, best_begin, best_end = 0, 0, 0.0, -1.0, 0, 0
@@ -176,17 +185,18 @@ def read(belief: Floats, z: NDArray[np.float32], way: Floats, xy: Floats, reach:
         if abs(way[r] - centre) < abs(way[item] - centre):
             item = r
     out[0] = most
-    beside, elsewhere, top, highest = -1e9, -1e9, 0, z[0]
+    beside, verified, elsewhere, away = -1e9, -1e9, -1e9, 0.0
     for r in range(n):
-        if z[r] > highest:
-            top, highest = r, z[r]
-        if z[r] > beside and abs(way[r] - way[item]) < reach[1]:
-            beside = z[r]
-        if z[r] > elsewhere and _apart(way, xy, r, item) > reach[3]:
+        if abs(way[r] - way[item]) < reach[1]:
+            beside, verified = max(beside, z[r]), max(verified, verifying[r])
+        if z[r] > elsewhere and _apart(way, xy, r, item) > reach[2]:
             elsewhere = z[r]
+        east, north = xy[r, 0] - xy[item, 0], xy[r, 1] - xy[item, 1]
+        away += belief[r] * min(east * east + north * north, reach[3] * reach[3])
     out[1] = beside
     out[2] = elsewhere if elsewhere >= -1e8 else -4.0  # the whole map is one place
-    out[3] = 1.0 if _apart(way, xy, top, item) < reach[2] else 0.0
+    out[3] = verified
+    out[4] = np.sqrt(max(away, 0.0))
     return item
 
 

@@ -14,7 +14,7 @@ from evplace.matchers import Learned, Rows, Seen
 from evplace.matchers._answering import Reader
 from evplace.matchers._belief import WRONG, Clock, Filter, Moment, clock_of, smoothed
 from evplace.matchers._kept import Kept
-from evplace.matchers._known import SIGNS
+from evplace.matchers._known import LATE_SIGNS, SIGNS
 from evplace.matchers._ways import Ways
 
 Floats = NDArray[np.float64]
@@ -26,13 +26,14 @@ class _Drive:
     """The weights of a drive's images and the moments that they fall into."""
 
     def __init__(self, seen: Sequence[Seen], clock: Clock) -> None:
-        self.weight = np.zeros(len(seen))
+        self.weight, self.slow = np.zeros(len(seen)), np.zeros(len(seen), np.bool_)
         self.begins = [0]
         """The first image of each moment."""
         self.driven_s = [0.0]
         """Seconds of driving before each moment."""
         for query, one in enumerate(seen):
             self.weight[query], driven_s = clock.see(one)
+            self.slow[query] = clock.slow
             if driven_s is not None and query:
                 self.begins.append(query)
                 self.driven_s.append(driven_s)
@@ -45,24 +46,29 @@ class Trace(NamedTuple):
     item: NDArray[np.int64]
     """(queries,) the answers."""
     signs: Floats
-    """(queries, SIGNS) see `_known`."""
+    """(queries, SIGNS) see `_known`, of live answers; (queries, LATE_SIGNS) of late ones."""
     live: Floats
     """(queries, SIGNS) those of what is said live."""
     weight: Floats
     """(queries,) how much each image counts."""
+    slow: NDArray[np.bool_]
+    """(queries,) whether each came long after the one before it."""
 
 
 def live(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
     """Each answer from the images up to it; `learned` is what the map has told."""
     filter_, reader, clock = Filter(ways, learned.get(WRONG)), Reader(ways), clock_of(learned)
     signs = np.zeros((len(rows), SIGNS))
-    out = Trace(np.zeros(len(rows), np.int64), signs, signs, np.zeros(len(rows)))
+    slow = np.zeros(len(rows), np.bool_)
+    out = Trace(np.zeros(len(rows), np.int64), signs, signs, np.zeros(len(rows)), slow)
     for query, (row, one) in enumerate(zip(rows, seen, strict=True)):
         z = robust_z(row)
         out.weight[query], driven_s = clock.see(one)
+        slow[query] = clock.slow
         if driven_s is not None:
             filter_.move(driven_s)
-        found = reader.find(filter_.see(z, out.weight[query]), z)
+        belief = filter_.see(z, out.weight[query])
+        found = reader.find(belief, z, one.verifying, filter_.speeds)
         out.item[query], out.signs[query] = found.item, found.signs
     return out
 
@@ -70,17 +76,17 @@ def live(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trac
 def late(ways: Ways, rows: Rows, seen: Sequence[Seen], learned: Learned) -> Trace:
     """Each answer from all images of the drive."""
     drive, wrong = _Drive(seen, clock_of(learned)), learned.get(WRONG)
-    signs, said = (np.zeros((len(rows), SIGNS)) for _ in range(2))
-    out = Trace(np.zeros(len(rows), np.int64), signs, said, drive.weight)
+    signs, said = np.zeros((len(rows), LATE_SIGNS)), np.zeros((len(rows), SIGNS))
+    out = Trace(np.zeros(len(rows), np.int64), signs, said, drive.weight, drive.slow)
     starts = _beliefs_at_blocks(ways, rows, drive, wrong)
     reader, message = Reader(ways), None
     for block, start in zip(range(len(starts), -1, -1), chain(starts.backwards(), [None]), strict=True):
         numbers = range(block * BLOCK, min((block + 1) * BLOCK, len(drive.begins)))
-        moments = _moments(ways, rows, drive, wrong, numbers, start, said)
+        moments = _moments(ways, rows, drive, wrong, numbers, start, (seen, said))
         beliefs, message = smoothed(moments, ways, message)
         for number, belief in zip(numbers, beliefs, strict=True):
             for query in range(drive.begins[number], drive.ends[number]):
-                found = reader.find(belief, robust_z(rows[query]))
+                found = reader.find(belief, robust_z(rows[query]), seen[query].verifying)
                 out.item[query], out.signs[query] = found.item, found.signs
     return out
 
@@ -102,9 +108,12 @@ def _moments(
     wrong: Floats | None,
     numbers: range,
     start: NDArray[np.floating[Any]] | None,
-    said: Floats | None = None,
+    said: tuple[Sequence[Seen], Floats] | None = None,
 ) -> list[Moment]:
-    """The moments of some numbers, from the belief before them; `said` gets the signs of live answers."""
+    """The moments of some numbers, from the belief before them.
+
+    With what was `said` of live answers, their signs are put there.
+    """
     filter_, reader, out = Filter(ways, wrong), Reader(ways), []
     if start is not None:
         filter_.belief = start.astype(np.float64)
@@ -115,6 +124,7 @@ def _moments(
             z = robust_z(rows[query])
             belief = filter_.see(z, drive.weight[query])
             if said is not None:
-                said[query] = reader.find(belief, z).signs
+                seen, signs = said
+                signs[query] = reader.find(belief, z, seen[query].verifying, filter_.speeds).signs
         out.append(filter_.moment)
     return out

@@ -38,10 +38,10 @@ from evplace.matchers import (
     Sweep,
 )
 from evplace.matchers._answering import Found, Reader
-from evplace.matchers._belief import WRONG, Filter, Moment, clock_of, smoothed, taken
-from evplace.matchers._calibration import LATE, LIVE, checked, measured, together
+from evplace.matchers._belief import WRONG, Clock, Filter, Moment, clock_of, smoothed, taken
+from evplace.matchers._calibration import LATE, LIVE, SLOW, checked, measured, together
 from evplace.matchers._kept import Kept, after, live_rows
-from evplace.matchers._known import Means, joined, means_ahead, of_late, probability
+from evplace.matchers._known import LATE_SIGNS, Means, joined, means_ahead, of_late, probability
 from evplace.matchers._rows import RowCheck, above
 from evplace.matchers._traces import late
 from evplace.matchers._ways import Ways
@@ -83,7 +83,7 @@ class Bayes:
 
     def learn_more(self, before: Learned, route: Route, rows: Callable[[slice], Rows]) -> Learned:
         """See LearnsMore."""
-        return together(before, measured(route, rows, least=1))
+        return together(checked(before), measured(route, rows, least=1))
 
     def follow(self, route: Route, distances: bool = False) -> Following:  # noqa: ARG002 - a distance is -d
         """See RouteMatcher."""
@@ -92,8 +92,8 @@ class Bayes:
     def in_hindsight(self, route: Route, rows: Rows, seen: Sequence[Seen]) -> Path:
         """See RouteMatcher."""
         trace = late(Ways.of(route), rows, seen, checked(route.learned))
-        right = probability(of_late(trace.signs, trace.live, trace.weight))
-        return Path(trace.item, right, right > self._threshold(route, LATE))
+        right = probability(of_late(trace.signs, trace.live, trace.weight), trace.slow)
+        return Path(trace.item, right, right > np.array(self._limits(route, LATE))[trace.slow.astype(int)])
 
     def start(self, distances: bool = False) -> Matching:  # noqa: ARG002 - a distance is -d
         """On rows alone: items a step apart, one query a step."""
@@ -104,11 +104,16 @@ class Bayes:
         usual = parameter in (None, "threshold")
         return Sweep(parameter or "threshold", self, above if usual else None)
 
-    def _threshold(self, route: Route, kind: str) -> float:
-        """What a probability must be above; where the map could not be measured, any is."""
+    def _limits(self, route: Route, kind: str) -> tuple[float, float]:
+        """What a probability must be above, of a quick camera and of a slow one; any where the map could not
+        be measured.
+        """
         if self.threshold is not None:
-            return self.threshold
-        unknown = (route.learned or {}).get(kind)
+            return self.threshold, self.threshold
+        quick, slow = ((route.learned or {}).get(name) for name in (kind, kind + SLOW))
+        return self._limit(quick), self._limit(slow)
+
+    def _limit(self, unknown: Floats | None) -> float:
         return -1.0 if unknown is None else max(float(np.quantile(unknown, 1 - self.false_accept)), LEAST)
 
 
@@ -121,7 +126,7 @@ class _Live:
     def __init__(self, settings: Bayes, route: Route) -> None:
         learned = checked(route.learned)
         self._settings = settings
-        self._threshold, self._measured = settings._threshold(route, LIVE), LIVE in learned
+        self._limits, self._measured = settings._limits(route, LIVE), LIVE in learned
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
         self._reader, self._is_part = Reader(self._filter.ways, route.left_out), route.left_out > 0
         self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
@@ -134,9 +139,9 @@ class _Live:
         if drive_s is not None:
             self._filter.move(drive_s)
         belief = self._filter.see(z, weight)
-        found = self._reader.find(belief, z)
-        right = float(probability(self._means.add(found.signs, weight)))
-        return [_answer(self, self._check.queries - 1, belief, found, right, self._clock.standing)]
+        found = self._reader.find(belief, z, seen.verifying, self._filter.speeds)
+        right = float(probability(self._means.add(found.signs, weight)[None], self._clock.slow)[0])
+        return [_answer(self, self._check.queries - 1, belief, found, right, self._clock)]
 
     def finish(self) -> list[Answer]:
         """See Following."""
@@ -153,8 +158,10 @@ class _Seen(NamedTuple):
     query: int
     t_us: int
     z: NDArray[np.float32]
+    verifying: NDArray[np.float32] | None
     weight: float
     standing: bool
+    slow: bool
     moment: int
     """Its number, of all moments so far."""
     said: Floats
@@ -167,11 +174,11 @@ class _Lagging:
     def __init__(self, settings: Bayes, route: Route) -> None:
         learned = checked(route.learned)
         self._settings = settings
-        self._threshold, self._measured = settings._threshold(route, LATE), LATE in learned
+        self._limits, self._measured = settings._limits(route, LATE), LATE in learned
         self._lag_us = round(settings.lag_s * 1e6)
         self._filter = Filter(Ways.of(route), learned.get(WRONG))
         self._reader, self._is_part = Reader(self._filter.ways, route.left_out), route.left_out > 0
-        self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means()
+        self._clock, self._check, self._means = clock_of(learned), RowCheck(), Means(LATE_SIGNS)
         self._said = Means()
         self._waiting: deque[_Seen] = deque()
         self._moments: deque[Moment] = deque()
@@ -186,10 +193,12 @@ class _Lagging:
             self._moments.append(self._filter.moment)
             self._filter.move(drive_s)
             self._moved += 1
-        found = self._reader.find(self._filter.see(z, weight), z)
-        said = self._said.add(found.signs, weight)
+        belief = self._filter.see(z, weight)
+        found = self._reader.find(belief, z, seen.verifying, self._filter.speeds)
+        said, clock = self._said.add(found.signs, weight), self._clock
+        query, verifying = self._check.queries - 1, seen.verifying
         self._waiting.append(
-            _Seen(self._check.queries - 1, seen.t_us, z, weight, self._clock.standing, self._moved, said)
+            _Seen(query, seen.t_us, z, verifying, weight, clock.standing, clock.slow, self._moved, said)
         )
         return self._answers(sum(one.t_us <= seen.t_us - self._lag_us for one in self._waiting))
 
@@ -202,7 +211,7 @@ class _Lagging:
         other = _Lagging(self._settings, route)
         _go_on(other, self, came_from)
         other._moved, other._said = self._moved, self._said
-        other._waiting.extend(one._replace(z=taken(one.z, came_from)) for one in self._waiting)
+        other._waiting.extend(_taken(one, came_from) for one in self._waiting)
         other._moments.extend(
             Moment(taken(one.belief, came_from), taken(one.evidence, came_from), one.moved_s)
             for one in self._moments
@@ -216,16 +225,19 @@ class _Lagging:
         moments = [*self._moments, self._filter.moment]
         first = self._moved - len(self._moments)
         beliefs, _ = smoothed(moments, self._filter.ways)
-        found = [self._reader.find(beliefs[one.moment - first], one.z) for one in self._waiting]
+        found = [
+            self._reader.find(beliefs[one.moment - first], one.z, one.verifying) for one in self._waiting
+        ]
         weights = np.array([one.weight for one in self._waiting])
         ahead = means_ahead(np.array([one.signs for one in found]), weights)
         answers = []
         for at in range(due):
             one = self._waiting.popleft()
             before = self._means.add(found[at].signs, one.weight)
-            right = float(probability(np.concatenate([joined(before, ahead[at]), one.said])))
+            features = np.concatenate([joined(before, ahead[at]), one.said])
+            right = float(probability(features[None], one.slow)[0])
             belief = beliefs[one.moment - first]
-            answers.append(_answer(self, one.query, belief, found[at], right, one.standing))
+            answers.append(_answer(self, one.query, belief, found[at], right, one))
         while self._waiting and self._waiting[0].moment > self._moved - len(self._moments):
             self._moments.popleft()
         return answers
@@ -238,14 +250,21 @@ def _go_on(now: _Live | _Lagging, before: _Live | _Lagging, came_from: NDArray[n
     now._check.queries = before._check.queries
 
 
+def _taken(seen: _Seen, came_from: NDArray[np.int64]) -> _Seen:
+    """What was seen, of other items; `came_from` as in `Continuing`."""
+    verifying = None if seen.verifying is None else taken(seen.verifying, came_from)
+    return seen._replace(z=taken(seen.z, came_from), verifying=verifying)
+
+
 def _answer(
-    by: _Live | _Lagging, query: int, belief: Floats, found: Found, right: float, standing: bool
+    by: _Live | _Lagging, query: int, belief: Floats, found: Found, right: float, image: Clock | _Seen
 ) -> Answer:
-    """The answer, with what it is worth."""
-    accepted = right > by._threshold
+    """The answer to an image that stood or not, came slowly or not, with what it is worth."""
+    limit = by._limits[image.slow]
+    accepted = right > limit
     others = by._reader.others(belief, found.item)
     estimate = Estimate(
-        _state(right, by._threshold, standing, found.mass, others.mass),
+        _state(right, limit, image.standing, found.mass, others.mass),
         right if by._measured else math.nan,
         by._reader.uncertainty_m(belief, found.item),
         others.items,

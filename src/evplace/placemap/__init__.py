@@ -47,7 +47,7 @@ from evplace.placemap._files import (
     write_sums,
 )
 from evplace.placemap._files import MARK as MARK
-from evplace.placemap._parts import JoinedRows, Part, images_of
+from evplace.placemap._parts import Part, images_of, joined_rows
 from evplace.places import Places
 from evplace.scorers import REFERENCES, Content, Descriptor, OpenScorer, Scorer, opened_together, scorer_of
 from evplace.sources.cleaning import MaskSource
@@ -127,7 +127,7 @@ class PlaceMap:
             if not self.parts:
                 return scorer_of(self.scorer).open(self.content)
             opened = opened_together(self.scorer, [part.map.content for part in self.parts])
-            return JoinedRows(opened, [part.item for part in self.parts])
+            return joined_rows(opened, [part.item for part in self.parts])
 
     def route(self, learned: bool = True) -> Route:
         """What a matcher may know of the items; with what the map's own matcher has learned, or without."""

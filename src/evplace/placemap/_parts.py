@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evplace.scorers import ComparesSome, OpenScorer, Rows
+from evplace.scorers import ComparesSome, OpenScorer, Rows, Scored, Verifies
 
 if TYPE_CHECKING:
     from evplace.placemap import Items, PlaceMap
@@ -57,11 +57,14 @@ class JoinedRows:
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         """See OpenScorer."""
-        return self.best(self.of_references(images))
+        return self.best(self.of_references(images)[0])
 
-    def of_references(self, images: NDArray[np.uint8]) -> Rows:
-        """(n, references) of all drives."""
-        return np.concatenate([one.rows(images) for one in self._opened], axis=1)
+    def of_references(self, images: NDArray[np.uint8]) -> list[Rows]:
+        """(n, references) of all drives: `rows`, and where the scorer verifies, those that do."""
+        each: list[Sequence[Rows]] = [
+            one.scored(images) if isinstance(one, Verifies) else [one.rows(images)] for one in self._opened
+        ]
+        return [np.concatenate(rows, axis=1) for rows in zip(*each, strict=True)]
 
     def best(self, rows: Rows) -> Rows:
         """(n, references) -> (n, items)."""
@@ -69,13 +72,34 @@ class JoinedRows:
 
     def some(self, images: NDArray[np.uint8], items: Ints) -> Rows:
         """(n, len(items)) what `rows` would give for these items."""
+        return self._some(images, items)[0]
+
+    def _some(self, images: NDArray[np.uint8], items: Ints) -> list[Rows]:
+        """(n, len(items)): `rows`, and where the scorer verifies, those that do."""
         chosen = [np.flatnonzero(np.isin(belong, items)) for belong in self._belong]
-        pairs = list(zip(self._opened, chosen, strict=True))
-        rows = np.concatenate([_some(one, images, some) for one, some in pairs if len(some)], axis=1)
+        pairs = zip(self._opened, chosen, strict=True)
+        each = [_some(one, images, some) for one, some in pairs if len(some)]
         found = _Grouped.of(
             np.concatenate([belong[some] for belong, some in zip(self._belong, chosen, strict=True)])
         )
-        return found.best(rows)[:, np.searchsorted(found.items, items)]
+        columns = np.searchsorted(found.items, items)
+        return [found.best(np.concatenate(rows, axis=1))[:, columns] for rows in zip(*each, strict=True)]
+
+
+class VerifyingRows(JoinedRows):
+    """The same where the scorer verifies: see Verifies."""
+
+    def scored(self, images: NDArray[np.uint8], items: Ints | None = None) -> Scored:
+        """See Verifies."""
+        if items is not None:
+            return Scored(*self._some(images, items))
+        return Scored(*(self.best(rows) for rows in self.of_references(images)))
+
+
+def joined_rows(opened: Sequence[OpenScorer], items: Sequence[Ints]) -> JoinedRows:
+    """What compares with all drives at once; `items` are those that the references of each belong to."""
+    verifies = all(isinstance(one, Verifies) for one in opened)
+    return (VerifyingRows if verifies else JoinedRows)(opened, items)
 
 
 class _Grouped(NamedTuple):
@@ -99,8 +123,12 @@ class _Grouped(NamedTuple):
         return np.asarray(np.maximum.reduceat(rows[:, self.order], self.first, axis=1), np.float32)
 
 
-def _some(one: OpenScorer, images: NDArray[np.uint8], references: Ints) -> Rows:
-    return one.some(images, references) if isinstance(one, ComparesSome) else one.rows(images)[:, references]
+def _some(one: OpenScorer, images: NDArray[np.uint8], references: Ints) -> Sequence[Rows]:
+    if isinstance(one, Verifies):
+        return one.scored(images, references)
+    return [
+        one.some(images, references) if isinstance(one, ComparesSome) else one.rows(images)[:, references]
+    ]
 
 
 def places_in(known: Items, new: Items) -> tuple[Ints, Ints]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from evplace.matchers.local import Local
 from evplace.placemap import Items, PlaceMap
 from evplace.placemap._parts import JoinedRows
 from evplace.places import Places
-from evplace.scorers import Descriptor, Learned, Learning, Scorer, require, scorer_of, usable
+from evplace.scorers import Descriptor, Learned, Learning, Scorer, Verifies, require, scorer_of, usable
 from evplace.scorers.fused import Fused
 from evplace.scorers.network import Network
 
@@ -128,30 +128,50 @@ class OwnRows:
         chosen = drives or range(len(parts))
         self._many = {drive: min(len(parts[drive].item), most // len(chosen)) for drive in chosen}
         self._images = [(drive, at) for drive, many in self._many.items() for at in range(many)]
+        self._last: tuple[slice, Sequence[Rows]] | None = None
 
     def route(self, content: float) -> Route:
         """What a matcher learns from, besides the rows; `content` is what the images usually show."""
         parts = self._map.parts
         own = [parts[drive].item[:many] for drive, many in self._many.items()] if parts else None
-        return self._map.route()._replace(content=content, own=own)
+        verifying = self.verifying if isinstance(self._scoring, Verifies) else None
+        return self._map.route()._replace(content=content, own=own, verifying=verifying)
 
     def rows(self, images: slice) -> Rows:
         """(n, items) of some of them. Of several drives, none counts that an image has with itself."""
-        with families.blaming("scorers", self._map.scorer):
-            if self._map.parts:
-                return np.concatenate([self._others(*image) for image in self._images[images]])
-            references = self._map.references
-            assert references is not None
-            return self._scoring.rows(np.asarray(references[images]))
+        return self._scored(images)[0]
 
-    def _others(self, drive: int, at: int) -> Rows:
-        """(1, items) of one image of a map of several drives."""
+    def verifying(self, images: slice) -> Rows:
+        """(n, items) those that verify."""
+        return self._scored(images)[1]
+
+    def _scored(self, images: slice) -> Sequence[Rows]:
+        """`rows`, and where the scorer verifies, those that do; made once, since both are asked for."""
+        if self._last is None or self._last[0] != images:
+            with families.blaming("scorers", self._map.scorer):
+                self._last = images, self._score(images)
+        return self._last[1]
+
+    def _score(self, images: slice) -> Sequence[Rows]:
+        if self._map.parts:
+            each = [self._others(*image) for image in self._images[images]]
+            return [np.concatenate(rows) for rows in zip(*each, strict=True)]
+        references = self._map.references
+        assert references is not None
+        some = np.asarray(references[images])
+        if isinstance(self._scoring, Verifies):
+            return self._scoring.scored(some)
+        return [self._scoring.rows(some)]
+
+    def _others(self, drive: int, at: int) -> list[Rows]:
+        """(1, items) of one image of a map of several drives: `rows`, and those that verify, if any do."""
         image = self._map.parts[drive].map.images_of([at])
         assert isinstance(self._scoring, JoinedRows)
         assert image is not None
-        rows = self._scoring.of_references(image)
-        rows[0, self._first[drive] + at] = rows[0].min()
-        return self._scoring.best(rows)
+        found = self._scoring.of_references(image)
+        for rows in found:
+            rows[0, self._first[drive] + at] = rows[0].min()
+        return [self._scoring.best(rows) for rows in found]
 
 
 def _content(place_map: PlaceMap) -> float:

@@ -69,6 +69,26 @@ class ComparesSome(Protocol):
         """(n, len(items)) what `rows` would give for these items."""
 
 
+class Scored(NamedTuple):
+    """What a scorer of several descriptors makes of some images."""
+
+    rows: Rows
+    """The scores of all its descriptors together."""
+    verifying: Rows
+    """z-scores of the same shape, of one of them alone."""
+
+
+@runtime_checkable
+class Verifies(Protocol):
+    """An OpenScorer that adds up several descriptors, and also says what one of them alone makes of an image.
+
+    All together find the place, since each errs elsewhere; the one tells better whether it is that place.
+    """
+
+    def scored(self, images: NDArray[np.uint8], items: NDArray[np.int64] | None = None) -> Scored:
+        """(n, items), or (n, len(items)) of some items: what `rows` or `some` give, and that of the one."""
+
+
 class Scorer(Protocol):
     """A way to compare, with its settings. A class may have `presets`: names and objects of it.
 

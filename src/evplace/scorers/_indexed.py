@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core import families
-from evplace.core.zscores import ordered, scale_of
-from evplace.scorers import Content, Descriptor, Rows, Vectors
+from evplace.core.zscores import ordered, robust_z, scale_of
+from evplace.scorers import Content, Descriptor, Rows, Scored, Vectors
 from evplace.scorers._compressed import Compressed
 from evplace.searchers import array_of, damaged, kept, opened
 
@@ -33,6 +33,20 @@ class Scale(NamedTuple):
     """What the score of each descriptor counts."""
     shift: float
     """What is taken off their sum."""
+
+
+class _Asked(NamedTuple):
+    """What an index is asked of an image."""
+
+    query: Vectors
+    """(1, dimensions)."""
+    shift: float
+    """What is taken off its scores, so that they are z-scores."""
+    verifying: Vectors
+    """(1, dimensions) for the first descriptor alone."""
+    verifying_shift: float
+    usual: tuple[Vectors, Vectors]
+    """z-scores of the references that tell what is usual, by all descriptors and by the first."""
 
 
 def scale(usual: list[Vectors], weights: list[float]) -> Scale:
@@ -64,7 +78,7 @@ def indexed(found: Mapping[str, Compressed], weights: Mapping[str, float], searc
 
 
 class IndexedRows:
-    """See OpenScorer."""
+    """See OpenScorer, ComparesSome and Verifies."""
 
     distances = False
 
@@ -85,28 +99,39 @@ class IndexedRows:
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
         """See OpenScorer; of references that are not listed it says that they are usual, 0."""
-        return np.stack([self._row(images[at : at + 1]) for at in range(len(images))])
+        return self.scored(images).rows
 
     def some(self, images: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
         """See ComparesSome."""
-        rows = []
-        for at in range(len(images)):
-            query, by, _ = self._asked(images[at : at + 1])
-            rows.append(self._search.scores(query, items)[0] - np.float32(by.shift))
-        return np.stack(rows)
+        return self.scored(images, items).rows
 
-    def _row(self, image: NDArray[np.uint8]) -> Vectors:
-        query, by, usual = self._asked(image)
+    def scored(self, images: NDArray[np.uint8], items: NDArray[np.int64] | None = None) -> Scored:
+        """See Verifies."""
+        asked = [self._asked(images[at : at + 1]) for at in range(len(images))]
+        pairs = [self._row(one) if items is None else self._some(one, items) for one in asked]
+        return Scored(*(np.stack(rows) for rows in zip(*pairs, strict=True)))
+
+    def _some(self, asked: _Asked, items: NDArray[np.int64]) -> tuple[Vectors, Vectors]:
+        """(len(items),) of all descriptors, and of the first."""
+        pairs = [(asked.query, asked.shift), (asked.verifying, asked.verifying_shift)]
+        row, verifying = (self._search.scores(query, items)[0] - np.float32(shift) for query, shift in pairs)
+        return row, verifying
+
+    def _row(self, asked: _Asked) -> tuple[Vectors, Vectors]:
+        """(items,) the same of all."""
         if self._search.compares_all:
-            return np.asarray(self._search.rows(query)[0] - np.float32(by.shift))
-        row = np.zeros(self._items, np.float32)
-        row[ordered(self._items)] = usual
-        found = self._search.top(query, LISTED)
-        row[found.items[0]] = found.scores[0] - np.float32(by.shift)
-        return row
+            pairs = [(asked.query, asked.shift), (asked.verifying, asked.verifying_shift)]
+            whole, alone = (self._search.rows(query)[0] - np.float32(shift) for query, shift in pairs)
+            return whole, alone
+        row, verifying = np.zeros(self._items, np.float32), np.zeros(self._items, np.float32)
+        row[ordered(self._items)], verifying[ordered(self._items)] = asked.usual
+        found = self._search.top(asked.query, LISTED)
+        items = np.sort(found.items[0])
+        row[found.items[0]] = found.scores[0] - np.float32(asked.shift)
+        verifying[items] = self._some(asked, items)[1]
+        return row, verifying
 
-    def _asked(self, image: NDArray[np.uint8]) -> tuple[Vectors, Scale, Vectors]:
-        """(1, dimensions) what the index is asked, what makes its scores z-scores, and those of the usual."""
+    def _asked(self, image: NDArray[np.uint8]) -> _Asked:
         described = [
             part.describe(image) @ basis
             for part, basis in zip(self._parts.values(), self._bases, strict=True)
@@ -120,7 +145,13 @@ class IndexedRows:
             )
         ]
         usual = sum(np.float32(factor) * one for factor, one in zip(by.factors, scores, strict=True))
-        return np.concatenate(beside, axis=1), by, np.asarray(usual - np.float32(by.shift), np.float32)
+        alone = scale(scores[:1], self._weights[:1])
+        verifying = [np.zeros_like(one) for one in beside]
+        verifying[0] = np.float32(alone.factors[0] * self._spreads[0] / self._weights[0]) * described[0]
+        return _Asked(
+            np.concatenate(beside, axis=1), by.shift, np.concatenate(verifying, axis=1), alone.shift,
+            (np.asarray(usual - np.float32(by.shift), np.float32), robust_z(scores[0])),
+        )  # fmt: skip
 
 
 def _spread(vectors: Vectors, usual: Vectors) -> float:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from evplace.core import families
 from evplace.core.errors import PlaceMapError, SettingsError
-from evplace.core.zscores import ordered, robust_z
+from evplace.core.zscores import ordered, robust_z, z_by
 from evplace.imaging.activity import activity
 from evplace.imaging.averaging import Averaging, averaged
 from evplace.imaging.spacing import Spacer, SpacingSettings
@@ -31,6 +31,7 @@ from evplace.scorers import (
     Learning,
     OpenScorer,
     Rows,
+    Scored,
     in_blocks,
     references_of,
     usable,
@@ -82,7 +83,7 @@ class Fused:
 
     @property
     def parts(self) -> dict[str, Descriptor]:
-        """The descriptors by their names."""
+        """The descriptors by their names; the first one verifies."""
         return {"edges": Edges()} | ({"trained": Trained()} if self.trained else {})
 
     def learn(self, reference: Traverse, places: Places, _: Learning) -> Learned:
@@ -135,6 +136,8 @@ Fused.presets = {"best": Fused()}
 
 
 class _FusedRows:
+    """See OpenScorer, ComparesSome and Verifies."""
+
     distances = False
 
     def __init__(self, parts: list[tuple[float, Descriptor, Compressed]]) -> None:
@@ -142,32 +145,34 @@ class _FusedRows:
         self._parts = parts
 
     def rows(self, images: NDArray[np.uint8]) -> Rows:
-        return np.concatenate([self._row(images[at : at + 1]) for at in range(len(images))])
+        return self.scored(images).rows
 
     def some(self, images: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
-        """See ComparesSome."""
-        return np.concatenate([self._some(images[at : at + 1], items) for at in range(len(images))])
+        return self.scored(images, items).rows
 
-    def _row(self, image: NDArray[np.uint8]) -> Rows:
-        """(1, items): image by image, so that a row does not depend on what else is asked."""
-        scores = [
-            weight * robust_z(searched.rows(part.describe(image))[0])
-            for weight, part, searched in self._parts
-        ]
-        return robust_z(np.sum(scores, axis=0))[None]
+    def scored(self, images: NDArray[np.uint8], items: NDArray[np.int64] | None = None) -> Scored:
+        """Image by image, so that a row does not depend on what else is asked."""
+        each = [images[at : at + 1] for at in range(len(images))]
+        pairs = [self._row(image) if items is None else self._some(image, items) for image in each]
+        return Scored(*(np.stack(rows) for rows in zip(*pairs, strict=True)))
 
-    def _some(self, image: NDArray[np.uint8], items: NDArray[np.int64]) -> Rows:
-        """(1, len(items)): what is usual is told by those that tell it of a whole row."""
+    def _row(self, image: NDArray[np.uint8]) -> tuple[Rows, Rows]:
+        """(items,) of all parts, and of the first."""
+        scores = [robust_z(searched.rows(part.describe(image))[0]) for _, part, searched in self._parts]
+        weighed = [weight * row for (weight, _, _), row in zip(self._parts, scores, strict=True)]
+        return robust_z(np.sum(weighed, axis=0)), scores[0]
+
+    def _some(self, image: NDArray[np.uint8], items: NDArray[np.int64]) -> tuple[Rows, Rows]:
+        """(len(items),) the same of some: what is usual is told by those that tell it of a whole row."""
         weights = [weight for weight, _, _ in self._parts]
         described = [part.describe(image) @ searched.basis for _, part, searched in self._parts]
         held = [searched.vectors for _, _, searched in self._parts]
         usual = [one.dot(all_.T[:, ordered(len(all_))])[0] for one, all_ in zip(described, held, strict=True)]
         by = scale(usual, weights)
-        scores = [
-            np.float32(factor) * (one @ all_[items].T)
-            for factor, one, all_ in zip(by.factors, described, held, strict=True)
-        ]
-        return np.asarray(np.sum(scores, axis=0) - np.float32(by.shift), np.float32)
+        scores = [one.dot(all_[items].T)[0] for one, all_ in zip(described, held, strict=True)]
+        weighed = [np.float32(factor) * row for factor, row in zip(by.factors, scores, strict=True)]
+        row = np.asarray(np.sum(weighed, axis=0) - np.float32(by.shift), np.float32)
+        return row, z_by(usual[0], scores[0])
 
 
 def _weights(images: NDArray[np.uint8]) -> Mapping[str, float]:

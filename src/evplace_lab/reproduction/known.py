@@ -1,15 +1,16 @@
 """The weights of the matcher `bayes` that tell right answers from wrong ones, fitted on towns of their own.
 
-Each town's day is the map; its other drives are localised on the whole map, and on maps that lack every other
-stretch, so that the drive enters and leaves what is known. The figures are of towns that were left out, live
-and in hindsight, at the threshold for 1 % of false accepts: the accuracy on the whole map, and the share of
-false accepts on all. Two ways to find that threshold stand beside one another: by what the map tells of
-itself, as `bayes` does, and by the other towns' drives. The drives take half an hour of two cores, all else
-ten minutes of one.
+Each town's day is the map; its other drives are localised on the whole map, and on maps that lack every
+other stretch, so that the drive enters and leaves what is known: with all images and with some, by the
+default and by edges alone, on events and on colour. The figures are of towns that were left out, live and in
+hindsight, at the threshold for 1 % of false accepts: the accuracy on the whole map, and the share of false
+accepts on all. Two ways to find that threshold stand beside one another: by what the map tells of itself, as
+`bayes` does, and by the other towns' drives. The drives take an hour of two cores, all else as much of one.
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -20,24 +21,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
+from evplace.core.storage import write_json
 from evplace.core.workers import Workers
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
+from evplace.matchers import Seen
 from evplace.matchers import _traces as traces
 from evplace.matchers._calibration import strangers
-from evplace.matchers._known import of_late, of_live
+from evplace.matchers._known import Judges, of_late, of_live, said
 from evplace.matchers._ways import Ways
 from evplace.placemap import PlaceMap, train
+from evplace.placemap._training import OwnRows
 from evplace.places import PlaceGrid
-from evplace.scorers import scorer_of
+from evplace.scorers.fused import Fused
 from evplace_lab.city import CitySettings, generate
 from evplace_lab.reproduction import Choice, Table
+from evplace_lab.reproduction._boosting import boosted
 
-TITLE = "Known and unknown: the weights of bayes, and each town by the weights of the others, in %"
+TITLE = "Known and unknown: what tells right answers from wrong ones, each town by the others, in %"
 NEEDS = "nothing"
 INPUTS: tuple[str, ...] = ()
 METHODS: tuple[str, ...] = ()
-FORMAT = "evplace-known-1"
+FORMAT = "evplace-known-2"
+WEIGHTS = "known-weights.json"
+"""The file of the weights of all towns: `evplace/matchers/_known.json`."""
+DIGITS = 6
+"""That are kept of a weight."""
 TOWNS = (
     CitySettings(fps=60, seed=101, route_length_m=900, sensors=("ideal", "weak")),
     CitySettings(fps=60, seed=102, route_length_m=900, sensors=("ideal", "weak")),
@@ -47,6 +56,8 @@ TOWNS = (
         conditions=("day", "dusk", "fog", "night"),
     ),
 )  # fmt: skip
+COLOUR = "colour"
+"""The camera that each town has besides its sensors."""
 KINDS = ("live", "late")
 USED = "the map"
 """Where `bayes` takes its thresholds from."""
@@ -66,6 +77,27 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 
+class Way(NamedTuple):
+    """A way to localise the drives of a town."""
+
+    label: str
+    map_every: int = 1
+    """Every so many images of the day are the map's."""
+    every: int = 1
+    """Every so many of a drive are queries."""
+    scorer: Fused = Fused()
+
+
+USUAL = Way("ten images a second")
+OF_EVENTS = (
+    USUAL,
+    Way("two a second", every=5),
+    Way("one a second", every=10),
+    Way("one a second, and of the map", map_every=10, every=10),
+    Way("edges alone", scorer=Fused(trained=False)),
+)
+
+
 class Answers(NamedTuple):
     """What one drive's answers looked like, and which were right."""
 
@@ -74,14 +106,23 @@ class Answers(NamedTuple):
     right: dict[str, Bools]
     known: Bools
     """(queries,) whether any item is right."""
+    slow: Bools
+    """(queries,) whether each came long after the one before it."""
+
+
+class Camera(NamedTuple):
+    """What the map is of, and how it is localised on."""
+
+    town: int
+    sensor: str
+    way: str
 
 
 @dataclass(frozen=True)
 class Drive:
     """One drive on one map, whole or cut."""
 
-    town: int
-    sensor: str
+    camera: Camera
     query: str
     whole: bool
     answers: Answers
@@ -91,8 +132,7 @@ class Drive:
 class Own:
     """What one map tells of itself."""
 
-    town: int
-    sensor: str
+    camera: Camera
     features: dict[str, Floats]
     """"live" or "late" -> (unknown, features) of images whose places are cut out."""
 
@@ -110,84 +150,106 @@ def document(
     for number, town in enumerate(TOWNS):
         folder = out / f"town-{town.seed}"
         generate(folder, town, workers=workers)
-        for sensor in town.sensors:
+        for sensor in (*town.sensors, COLOUR):
             said(number, len(TOWNS), f"town {town.seed}, {sensor}")
-            place_map = _map_of(folder, sensor)
-            own.append(_own(place_map, town.seed, sensor))
-            drives += _drives(folder, town, sensor, place_map)
-    weights = {kind: _fitted(drives, kind) for kind in KINDS}
+            for way in OF_EVENTS if sensor != COLOUR else (USUAL,):
+                found = _localised(folder, town, sensor, way)
+                own.append(found[0])
+                drives += found[1]
+    judges = {kind: _fitted(drives, kind) for kind in KINDS}
+    weights = {kind: _plain(found) for kind, found in judges.items()}
+    write_json(out / WEIGHTS, weights)
     return {
         "format": FORMAT,
         "title": TITLE,
-        "weights": {kind: found.tolist() for kind, found in weights.items()},
         "rows": [row for town in TOWNS for row in _judged(drives, own, town.seed)],
         "cpu_s": round(time.process_time() - began, 1),
     }
 
 
+def _plain(judges: Judges) -> dict[str, Any]:
+    """As JSON holds it."""
+    quick, slow = judges
+    return {
+        "start": _rounded(np.array(quick.start)),
+        "feature": quick.feature.tolist(),
+        "limit": _rounded(quick.limit),
+        "says": _rounded(quick.says),
+        "slow": _rounded(slow),
+    }
+
+
+def _rounded(values: Floats) -> Any:
+    return np.vectorize(lambda value: float(f"{value:.{DIGITS}g}"), otypes=[float])(values).tolist()
+
+
 def tables(document: dict[str, Any]) -> Iterator[Table]:
-    """Each town by the weights of the others; and the weights of all."""
+    """Each town by the weights of the others, and what that comes to for each way to localise."""
     rows = document["rows"]
     columns = ["town", "sensor", "query", "live", "false accepts", "late", "false accepts"]
     lines = [
         [str(row["town"]), row["sensor"], row["query"],
          *(_shown(row[kind][USED][name]) for kind in KINDS for name in ("accuracy", "false_accepts"))]
-        for row in rows
+        for row in rows if row["way"] == USUAL.label
     ]  # fmt: skip
     yield Table(document["title"], columns, lines)
+    names = ("accuracy", "false_accepts", "most")
+    groups: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault("colour" if row["sensor"] == COLOUR else row["way"], []).append(row)
     lines = [
-        [kind, way, *(_shown(_mean(rows, kind, way, name)) for name in ("accuracy", "false_accepts"))]
+        [label, kind, by, *(_shown(_over(group, kind, by, name)) for name in names)]
+        for label, group in groups.items()
         for kind in KINDS
-        for way in rows[0][kind]
+        for by in group[0][kind]
     ]
-    yield Table("Where the threshold comes from", ["answers", "by", "accuracy", "false accepts"], lines)
-    weights = document["weights"]
-    lines = [[kind, " ".join(f"{weight:.4f}" for weight in weights[kind])] for kind in weights]
-    yield Table("For evplace/matchers/_known_weights.py", ["answers", "weights"], lines)
+    columns = ["drives", "answers", "by", "accuracy", "false accepts", "at most"]
+    yield Table("By what threshold, on the average", columns, lines)
 
 
-def _mean(rows: list[dict[str, Any]], kind: str, way: str, name: str) -> float:
-    """Over all drives that have it."""
-    found = [row[kind][way][name] for row in rows]
-    return float(np.mean([value for value in found if value is not None]))
+def _over(rows: list[dict[str, Any]], kind: str, by: str, name: str) -> float:
+    """Of all drives that have it, the average, or the most of false accepts."""
+    found = [row[kind][by]["false_accepts" if name == "most" else name] for row in rows]
+    values = [value for value in found if value is not None]
+    return float(np.max(values) if name == "most" else np.mean(values))
 
 
 def _shown(value: float | None) -> str:
     return "-" if value is None else f"{value:.1f}"
 
 
-def _map_of(folder: Path, sensor: str) -> PlaceMap:
-    """The map of a town's day."""
-    day = Traverse.load(folder / "day-1" / sensor)
+def _localised(folder: Path, town: CitySettings, sensor: str, way: Way) -> tuple[Own, list[Drive]]:
+    """What the map of a town's day tells of itself, and the town's other drives on it."""
+    day = Traverse.load(folder / "day-1" / sensor)[:: way.map_every]
     assert day.track is not None
-    return train(day, PlaceGrid.from_track(day.track))
+    place_map = train(day, PlaceGrid.from_track(day.track), way.scorer)
+    camera = Camera(town.seed, sensor, way.label)
+    return _own(place_map, camera), list(_drives(folder, town, place_map, camera, way.every))
 
 
-def _own(place_map: PlaceMap, town: int, sensor: str) -> Own:
+def _own(place_map: PlaceMap, camera: Camera) -> Own:
     """What the map tells of itself."""
-    references = place_map.references
-    assert references is not None
-    opened = scorer_of(place_map.scorer).open(place_map.content)
-    found = strangers(place_map.route(), lambda items: opened.rows(references[items]))
+    own = OwnRows(place_map)
+    found = strangers(own.route(math.nan), own.rows)
     assert found is not None
-    return Own(town, sensor, {"live": found.live, "late": found.late})
+    return Own(camera, {"live": found.live, "late": found.late})
 
 
-def _drives(folder: Path, town: CitySettings, sensor: str, place_map: PlaceMap) -> Iterator[Drive]:
+def _drives(
+    folder: Path, town: CitySettings, place_map: PlaceMap, camera: Camera, every: int
+) -> Iterator[Drive]:
     """All drives of a town but the map's own, each on the whole map and on cut ones."""
     rng = np.random.default_rng(town.seed)
     for condition, path in town.drives():
         query = f"{condition}-{path}"
         if query == "day-1":
             continue
-        traverse = Traverse.load(folder / query / sensor)
-        where = Localizer(place_map)
-        seen, rows = where.seen_of(traverse)
-        every = np.ones(len(place_map.items), np.bool_)
+        traverse = Traverse.load(folder / query / camera.sensor)[::every]
+        seen, rows = Localizer(place_map).seen_of(traverse)
+        whole = np.ones(len(place_map.items), np.bool_)
         for number in range(1 + CUTS):
-            keep = _cut(Ways.of(place_map.route()), rng) if number else every
-            answers = _answers(place_map, traverse, rows, seen, keep)
-            yield Drive(town.seed, sensor, query, number == 0, answers)
+            keep = _cut(Ways.of(place_map.route()), rng) if number else whole
+            yield Drive(camera, query, number == 0, _answers(place_map, traverse, rows, seen, keep))
 
 
 def _cut(ways: Ways, rng: np.random.Generator) -> Bools:
@@ -200,7 +262,7 @@ def _cut(ways: Ways, rng: np.random.Generator) -> Bools:
 
 
 def _answers(
-    place_map: PlaceMap, query: Traverse, rows: NDArray[np.float32], seen: Any, keep: Bools
+    place_map: PlaceMap, query: Traverse, rows: NDArray[np.float32], seen: list[Seen], keep: Bools
 ) -> Answers:
     """What the filter says of a drive on the items that are left."""
     route = place_map.route()
@@ -209,6 +271,7 @@ def _answers(
         position=route.position[keep], heading_deg=route.heading_deg[keep], t_us=route.t_us[keep]
     )
     ways, learned = Ways.of(part), route.learned or {}
+    seen = [one._replace(verifying=None if one.verifying is None else one.verifying[keep]) for one in seen]
     right = _right(query, part.position, part.heading_deg)
     found = {
         "live": traces.live(ways, rows[:, keep], seen, learned),
@@ -222,6 +285,7 @@ def _answers(
         },
         {kind: right[np.arange(len(right)), one.item] for kind, one in found.items()},
         known,
+        found["live"].slow,
     )
 
 
@@ -234,18 +298,39 @@ def _right(query: Traverse, position: Floats, heading_deg: Floats) -> Bools:
     return np.asarray((apart <= NEAR_M) & (turn <= SAME_WAY_DEG), np.bool_)
 
 
-def _fitted(drives: list[Drive], kind: str) -> Floats:
+def _fitted(drives: list[Drive], kind: str) -> Judges:
+    """What judges answers of a kind: trees, by those of quick cameras; a regression, by all of events."""
+    quick = [~drive.answers.slow for drive in drives]
+    right, features = (
+        np.concatenate([of(drive.answers)[chosen] for drive, chosen in zip(drives, quick, strict=True)])
+        for of in (_right_of(kind), _features_of(kind))
+    )
+    of_events = [drive for drive in drives if drive.camera.sensor != COLOUR]
+    return Judges(boosted(features, right), _linear(of_events, kind))
+
+
+def _right_of(kind: str) -> Callable[[Answers], Floats]:
+    return lambda answers: answers.right[kind].astype(np.float64)
+
+
+def _features_of(kind: str) -> Callable[[Answers], Floats]:
+    return lambda answers: answers.features[kind]
+
+
+def _linear(drives: list[Drive], kind: str) -> Floats:
     """The weights of 1 and of the features.
 
     Of late answers those of both sides are fitted by themselves; then the log-odds of live ones are added by
     LIVE_COUNTS, and the sum scaled anew.
     """
-    right = np.concatenate([drive.answers.right[kind] for drive in drives]).astype(np.float64)
-    features = np.concatenate([drive.answers.features[kind] for drive in drives])
+    right, features = (
+        np.concatenate([of(drive.answers) for drive in drives])
+        for of in (_right_of(kind), _features_of(kind))
+    )
     if kind == "live":
         return _regression(features, right)
     sides = len(features[0]) - len(drives[0].answers.features["live"][0])
-    own, live = _regression(features[:, :sides], right), _fitted(drives, "live")
+    own, live = _regression(features[:, :sides], right), _linear(drives, "live")
     weights = np.concatenate([[own[0] + LIVE_COUNTS * live[0]], own[1:], LIVE_COUNTS * live[1:]])
     shift, scale = _regression((weights[0] + features @ weights[1:])[:, None], right)
     return np.asarray(scale * weights + shift * np.eye(len(weights))[0], np.float64)
@@ -267,47 +352,58 @@ def _regression(features: Floats, right: Floats) -> Floats:
 
 def _judged(drives: list[Drive], own: list[Own], town: int) -> Iterator[dict[str, Any]]:
     """The drives of one town, by weights and thresholds fitted without it."""
-    rest = [one for one in drives if one.town != town]
-    weights = {kind: _fitted(rest, kind) for kind in KINDS}
-    for mine in (one for one in own if one.town == town):
-        thresholds = {kind: _thresholds(mine, rest, kind, weights[kind]) for kind in KINDS}
-        queries = [one for one in drives if one.town == town and one.sensor == mine.sensor]
+    rest = [one for one in drives if one.camera.town != town]
+    judges = {kind: _fitted(rest, kind) for kind in KINDS}
+    for mine in (one for one in own if one.camera.town == town):
+        thresholds = {kind: _thresholds(mine, rest, kind, judges[kind]) for kind in KINDS}
+        queries = [one for one in drives if one.camera == mine.camera]
         for query in dict.fromkeys(one.query for one in queries):
             group = [one for one in queries if one.query == query]
-            row: dict[str, Any] = {"town": town, "sensor": mine.sensor, "query": query}
+            row: dict[str, Any] = {**mine.camera._asdict(), "query": query}
             for kind in KINDS:
                 row[kind] = {
-                    way: _at(group, kind, weights[kind], limit) for way, limit in thresholds[kind].items()
+                    by: _at(group, kind, judges[kind], limits) for by, limits in thresholds[kind].items()
                 }
             yield row
 
 
-def _thresholds(mine: Own, rest: list[Drive], kind: str, weights: Floats) -> dict[str, float]:
-    """Where it comes from -> the threshold for as many false accepts as are asked for."""
-    own, elsewhere = (
-        float(np.quantile(unknown, 1 - ASKED))
-        for unknown in (_said(mine.features[kind], weights), _unknown(rest, kind, weights))
-    )
-    return {USED: own, "other towns": elsewhere}
+def _thresholds(mine: Own, rest: list[Drive], kind: str, judges: Judges) -> dict[str, Floats]:
+    """Where they come from -> (2,) for as many false accepts as are asked for, of quick and slow cameras."""
+    features = mine.features[kind]
+    flags = [np.full(len(features), slow) for slow in (False, True)]
+    own = [_quantile(said(judges, features, slow)) for slow in flags]
+    return {USED: np.array(own), "other towns": np.array(_elsewhere(rest, kind, judges))}
 
 
-def _at(group: list[Drive], kind: str, weights: Floats, limit: float) -> dict[str, float | None]:
+def _elsewhere(drives: list[Drive], kind: str, judges: Judges) -> list[float]:
+    """(2,) the same by other drives."""
+    unknown = np.concatenate([_unknown(one.answers, kind, judges) for one in drives])
+    slow = np.concatenate([one.answers.slow[~one.answers.known] for one in drives])
+    return [_quantile(unknown[slow == flag]) for flag in (False, True)]
+
+
+def _quantile(unknown: Floats) -> float:
+    return float(np.quantile(unknown, 1 - ASKED)) if len(unknown) else 1.0
+
+
+def _at(group: list[Drive], kind: str, judges: Judges, limits: Floats) -> dict[str, float | None]:
     """One query's accuracy on the whole map, and its false accepts on all maps, in %."""
     (whole,) = (one.answers for one in group if one.whole)
-    accepted = _said(whole.features[kind], weights) > limit
+    accepted = said(judges, whole.features[kind], whole.slow) > limits[whole.slow.astype(int)]
     good = np.where(whole.known, whole.right[kind] & accepted, ~accepted)
-    unknown = _unknown(group, kind, weights)
+    wrong = np.concatenate(
+        [
+            _unknown(one.answers, kind, judges) > limits[one.answers.slow[~one.answers.known].astype(int)]
+            for one in group
+        ]
+    )
     return {
         "accuracy": 100 * float(good.mean()),
-        "false_accepts": 100 * float((unknown > limit).mean()) if len(unknown) else None,
+        "false_accepts": 100 * float(wrong.mean()) if len(wrong) else None,
     }
 
 
-def _said(features: Floats, weights: Floats) -> Floats:
-    """(n,) the probabilities by some weights."""
-    return np.asarray(1 / (1 + np.exp(-(weights[0] + features @ weights[1:]))), np.float64)
-
-
-def _unknown(drives: list[Drive], kind: str, weights: Floats) -> Floats:
-    """The probabilities of all images of places that their maps lack."""
-    return np.concatenate([_said(one.answers.features[kind][~one.answers.known], weights) for one in drives])
+def _unknown(answers: Answers, kind: str, judges: Judges) -> Floats:
+    """The probabilities of the images of places that a drive's map lacks."""
+    there = ~answers.known
+    return said(judges, answers.features[kind][there], answers.slow[there])
