@@ -254,7 +254,7 @@ def test_calibrate_measures_a_map_anew(avenue: Path, street: Path, tmp_path: Pat
     shutil.copytree(avenue / "avenue.evp", tmp_path / "map")
     facts = json_of(capsys, "calibrate", tmp_path / "map")
     assert facts["matcher"] == "bayes"
-    assert 0 < facts["unknown_live_threshold"] < 1
+    assert 0 < facts["threshold_live"] < 1
     shutil.copytree(street, tmp_path / "short")
     assert main(["calibrate", f"{tmp_path}/short"]) == 0
     assert "could not be measured on itself" in capsys.readouterr().err

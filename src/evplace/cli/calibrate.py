@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import tyro
 
 from evplace.cli._matcher import NOT_MEASURED, is_measured
 from evplace.cli._output import note, print_facts, print_json
 from evplace.cli._settings import a_part_of
 from evplace.core import families
+from evplace.matchers.bayes import UNKNOWN, Bayes
 from evplace.placemap import PlaceMap, calibrate
 
 
@@ -41,14 +41,11 @@ def run(args: Args) -> int:
     chosen = None if args.matcher is None else families.make("matchers", args.matcher, None, {})
     measured = calibrate(place_map, chosen)
     measured.save(args.map, overwrite=True)
-    learned = measured.learned or {}
     facts: dict[str, object] = {"matcher": families.name_of("matchers", measured.matcher)}
-    for name, values in learned.items():
-        if name.startswith("unknown"):
-            facts |= {
-                f"{name}_images": len(values),
-                f"{name}_threshold": round(float(np.quantile(values, 0.99)), 3),
-            }
+    if measured.learned and isinstance(measured.matcher, Bayes):
+        limits = measured.matcher.limits(measured.learned)
+        facts["unknown_images"] = len(measured.learned[UNKNOWN])
+        facts |= {f"threshold_{name}": round(limit, 3) for name, limit in limits.items()}
     print_json(facts) if args.json else print_facts(str(args.map), facts)
     if not is_measured(measured):
         note(NOT_MEASURED)

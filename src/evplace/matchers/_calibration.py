@@ -19,7 +19,7 @@ from evplace.matchers import Learned, Route, Rows, Seen
 from evplace.matchers import _surroundings as around
 from evplace.matchers import _traces as traces
 from evplace.matchers._belief import CONTENT, WRONG
-from evplace.matchers._known import of_late, of_live, probability
+from evplace.matchers._known import judges, limit, of_late, of_live, probability
 from evplace.matchers._ways import Ways
 
 Floats = NDArray[np.float64]
@@ -75,6 +75,18 @@ def measured(route: Route, rows: Callable[[slice], Rows], least: int = LEAST_UNK
         for slow in (False, True)
     }
     return {**found.learned, **said}
+
+
+def limits(learned: Learned, kind: str, false_accept: float) -> tuple[float, float] | None:
+    """What a probability must be above for so many false accepts, of a quick camera and of a slow one.
+
+    `kind` is LIVE or LATE; None where the map could not be measured.
+    """
+    if kind not in learned:
+        return None
+    by = judges()[kind == LATE]
+    quick, slow = (limit(learned[kind + end], by, bool(end), false_accept) for end in ("", SLOW))
+    return quick, slow
 
 
 def together(before: Learned, more: Learned) -> Learned:

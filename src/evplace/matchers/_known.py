@@ -38,6 +38,8 @@ LONGER = np.array([sign * len(SPANS) + span for sign in range(LATE_SIGNS) for sp
 """Where the means over the longer spans stand, of late answers."""
 LEAST_AHEAD = 0.5
 """Images that must be ahead, by their weights, for these to have a mean."""
+ASKED = np.array([1e-4, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0])
+"""Shares of false accepts for which it is known what other towns need."""
 TINY = 1e-3
 """What keeps log-odds finite."""
 
@@ -68,6 +70,9 @@ class Judges(NamedTuple):
     """Of images that follow one another quickly."""
     slow: Floats
     """(1 + features,) of others: the weights of 1 and of the features."""
+    usual: Floats
+    """(2, ASKED) log-odds above which so many images of places never seen lie in other towns, of a quick
+    camera and of a slow one."""
 
 
 def signs_of(read: Floats, speeds: Floats | None = None) -> Floats:
@@ -183,6 +188,17 @@ def said(by: Judges, features: Floats, slow: Bools | bool) -> Floats:
     return np.asarray(1 / (1 + np.exp(-log_odds)), np.float64)
 
 
+def limit(unknown: Floats, by: Judges, slow: bool, false_accept: float) -> float:
+    """The probability above which no more than a share of images of places never seen is.
+
+    Halfway, by the log-odds, between what the map's own places tell that are cut out, (n,) sorted, and what
+    other towns need: a map has few stretches, and knows one light.
+    """
+    own = min(max(float(np.quantile(unknown, 1 - false_accept)), 1e-9), 1 - 1e-9)
+    usual = float(np.interp(np.log(false_accept), np.log(ASKED), by.usual[int(slow)]))
+    return float(1 / (1 + np.exp(-(np.log(own / (1 - own)) + usual) / 2)))
+
+
 @functools.cache
 def judges() -> tuple[Judges, Judges]:
     """Of live answers and of late ones."""
@@ -196,6 +212,7 @@ def judges() -> tuple[Judges, Judges]:
                 np.array(one["says"], np.float64),
             ),
             np.array(one["slow"], np.float64),
+            np.array(one["usual"], np.float64),
         )
         for one in (fitted["live"], fitted["late"])
     )

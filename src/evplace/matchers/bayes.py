@@ -39,7 +39,7 @@ from evplace.matchers import (
 )
 from evplace.matchers._answering import Found, Reader
 from evplace.matchers._belief import WRONG, Clock, Filter, Moment, clock_of, smoothed, taken
-from evplace.matchers._calibration import LATE, LIVE, SLOW, checked, measured, together
+from evplace.matchers._calibration import LATE, LIVE, checked, limits, measured, together
 from evplace.matchers._kept import Kept, after, live_rows
 from evplace.matchers._known import LATE_SIGNS, Means, joined, means_ahead, of_late, probability
 from evplace.matchers._rows import RowCheck, above
@@ -48,6 +48,8 @@ from evplace.matchers._ways import Ways
 
 Floats = NDArray[np.float64]
 
+UNKNOWN = LIVE
+"""What a map has learned of its places that were cut out, one number for each image."""
 UNDECIDED = 0.1
 """Below this share of the threshold an answer is no longer lost, but of a place never seen."""
 LEAST = 0.1
@@ -104,17 +106,25 @@ class Bayes:
         usual = parameter in (None, "threshold")
         return Sweep(parameter or "threshold", self, above if usual else None)
 
+    def limits(self, learned: Learned) -> dict[str, float]:
+        """What a probability must be above, by what a map has told: live, and late; of a slow camera, too."""
+        route = Route(np.empty((0, 2)), np.empty(0), learned=checked(learned))
+        kinds = {"live": LIVE, "late": LATE}
+        found = {name: self._limits(route, kind) for name, kind in kinds.items()}
+        return {
+            name + end: limit
+            for name, both in found.items()
+            for end, limit in zip(("", "_slow"), both, strict=True)
+        }
+
     def _limits(self, route: Route, kind: str) -> tuple[float, float]:
         """What a probability must be above, of a quick camera and of a slow one; any where the map could not
         be measured.
         """
         if self.threshold is not None:
             return self.threshold, self.threshold
-        quick, slow = ((route.learned or {}).get(name) for name in (kind, kind + SLOW))
-        return self._limit(quick), self._limit(slow)
-
-    def _limit(self, unknown: Floats | None) -> float:
-        return -1.0 if unknown is None else max(float(np.quantile(unknown, 1 - self.false_accept)), LEAST)
+        found = limits(route.learned or {}, kind, self.false_accept)
+        return (-1.0, -1.0) if found is None else (max(found[0], LEAST), max(found[1], LEAST))
 
 
 Bayes.presets = {"best": Bayes()}
