@@ -13,8 +13,8 @@ from evplace.matchers import Answer, Route, Seen
 from evplace.matchers import _belief as belief
 from evplace.matchers import _route_filter as loops
 from evplace.matchers import _traces as traces
-from evplace.matchers._calibration import LATE, LIVE
-from evplace.matchers._known import LONGER, Means, joined, of_live
+from evplace.matchers._calibration import LATE, LIVE, SLOW
+from evplace.matchers._known import LATE_SIGNS, LONGER, SIGNS, SPANS, Means, joined, of_live
 from evplace.matchers._ways import Ways
 from evplace.matchers.bayes import Bayes
 from evplace.testing import check_matcher
@@ -210,7 +210,7 @@ def test_where_images_are_a_second_apart_a_drive_is_found_in_a_few() -> None:
     sure = [one.accepted for one in answers]
     assert sure.index(True) < 8
     assert all(abs(one.item - at) <= 3 for one, at in zip(answers, on, strict=True) if one.accepted)
-    signs, weights = np.random.default_rng(0).normal(size=(20, 4)), np.full(20, 2.0)
+    signs, weights = np.random.default_rng(0).normal(size=(20, SIGNS)), np.full(20, 2.0)
     running, once = Means(), of_live(signs, np.ones(20))
     assert np.allclose([running.add(one, 2.0) for one in signs], once)
     assert np.allclose(of_live(signs, weights), once)
@@ -335,16 +335,17 @@ def test_more_false_accepts_are_allowed_more_answers_are_accepted() -> None:
 
 
 def test_with_what_comes_later_the_worse_side_counts_whichever_it_is() -> None:
-    before, ahead = np.arange(12.0), np.array([9.0, 0.0, 9.0, 0.0, 9.0, 0.0, 9.0, 0.0])
+    rng = np.random.default_rng(0)
+    before, ahead = rng.normal(size=LATE_SIGNS * len(SPANS)), rng.normal(size=len(LONGER))
     features = joined(before, ahead)
-    past = before[LONGER]
+    past, alone = before[LONGER], np.arange(LATE_SIGNS) * len(SPANS)
     np.testing.assert_array_equal(features[LONGER], np.minimum(past, ahead))
-    np.testing.assert_array_equal(features[12:], np.maximum(past, ahead))
-    assert features[[0, 3, 6, 9]].tolist() == [0.0, 3.0, 6.0, 9.0]  # the image alone
+    np.testing.assert_array_equal(features[len(before) :], np.maximum(past, ahead))
+    np.testing.assert_array_equal(features[alone], before[alone])
     other = before.copy()
     other[LONGER] = ahead
     np.testing.assert_array_equal(joined(other, past), features)
-    np.testing.assert_array_equal(joined(before, np.full(8, np.nan))[12:], past)
+    np.testing.assert_array_equal(joined(before, np.full(len(LONGER), np.nan))[len(before) :], past)
 
 
 def test_what_was_learned_must_be_what_is_learned() -> None:
@@ -353,8 +354,9 @@ def test_what_was_learned_must_be_what_is_learned() -> None:
     for name, wrong in (
         ("wrong", learned["wrong"][:-1]),
         ("wrong", np.full(360, np.nan)),
-        (LIVE, learned[LIVE][::-1].copy()),
+        (LIVE, np.linspace(0.9, 0.1, 9)),
         (LATE, learned[LATE] + 2),
+        (LATE + SLOW, np.linspace(0.9, 0.1, 9)),
         (LIVE, np.empty(0)),
         ("content", np.array([1.0, 2.0])),
         ("content", np.array([-1.0])),

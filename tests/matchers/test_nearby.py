@@ -75,7 +75,7 @@ def test_it_is_what_plain_numpy_says(items: int, kind: str, spread: str, seed: i
     radius = max(plain_radius(belief, reader.ways.xy, item), reader.ways.spacing / 2)
     assert reader.uncertainty_m(belief, item) == radius
     found = reader.others(belief, item)
-    wanted = plain_others(belief, reader.ways.xy, item, *reader._reach[[0, 3]].tolist())
+    wanted = plain_others(belief, reader.ways.xy, item, *reader._reach[[0, 2]].tolist())
     assert found.items == wanted.items
     np.testing.assert_allclose(found.mass, wanted.mass, rtol=1e-12)
 

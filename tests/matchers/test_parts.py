@@ -117,5 +117,5 @@ def test_a_part_is_judged_as_if_all_of_the_map_were_compared() -> None:
     assert (alone.item, alone.mass) == (among.item, among.mass)
     mass = alone.mass
     tenfold = mass / (mass + 10 * (1 - mass))
-    assert among.signs[3] == pytest.approx(np.log((tenfold + 1e-3) / (1 - tenfold + 1e-3)))
+    assert among.signs[2] == pytest.approx(np.log((tenfold + 1e-3) / (1 - tenfold + 1e-3)))
     assert alone.signs[1] - among.signs[1] == pytest.approx(RISE * np.log(10))

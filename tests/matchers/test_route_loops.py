@@ -69,17 +69,22 @@ def test_what_an_image_says_counts_as_plainly() -> None:
     np.testing.assert_array_equal(marginal, plain.sum(axis=1))
 
 
-def plain_read(shares: Floats, z: Floats, way: Floats, xy: Floats, reach: Floats) -> tuple[int, list[float]]:
-    """The stretch of most belief, the item in its middle, and the best scores beside it and elsewhere."""
+def plain_read(
+    shares: Floats, z: Floats, verifying: Floats, way: Floats, xy: Floats, reach: Floats
+) -> tuple[int, list[float]]:
+    """The stretch of most belief, the item in its middle, the best scores beside it and elsewhere, and how
+    far from it the belief lies.
+    """
     stretches = np.abs(way - way[:, None]) <= reach[0]
     held = stretches @ shares
     best = np.flatnonzero(stretches[int(held.argmax())])
     centre = shares[best] @ way[best] / shares[best].sum()
     item = int(best[np.abs(way[best] - centre).argmin()])
-    apart = np.minimum(np.abs(way - way[item]), np.hypot(*(xy - xy[item]).T))
-    beside, elsewhere = z[np.abs(way - way[item]) < reach[1]], z[apart > reach[3]]
-    agrees = float(apart[z.argmax()] < reach[2])
-    return item, [held.max(), beside.max(), elsewhere.max() if len(elsewhere) else -4.0, agrees]
+    beside, away = np.abs(way - way[item]) < reach[1], np.hypot(*(xy - xy[item]).T)
+    elsewhere = z[np.minimum(np.abs(way - way[item]), away) > reach[2]]
+    spread = np.sqrt(shares @ np.minimum(away, reach[3]) ** 2)
+    best_elsewhere = elsewhere.max() if len(elsewhere) else -4.0
+    return item, [held.max(), z[beside].max(), best_elsewhere, verifying[beside].max(), spread]
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -89,13 +94,13 @@ def test_a_belief_is_read_as_plainly(seed: int) -> None:
     items = int(rng.integers(1, 200))
     way = np.cumsum(rng.uniform(0.5, 3, items))
     xy = np.stack([np.abs(way - way.mean()), 5.0 * (way > way.mean())], axis=1)
-    shares, z = rng.random(items) ** 9, rng.normal(size=items).astype(np.float32)
+    shares, z, verifying = rng.random(items) ** 9, *rng.normal(size=(2, items)).astype(np.float32)
     shares /= shares.sum()
     z += np.exp(-np.square((way - way[shares.argmax()] - rng.normal(0, 15)) / 10)).astype(np.float32) * 6
-    found, reach = np.empty(4), np.array([15.0, 4.0, 10.0, 30.0])
-    item, signs = plain_read(shares, z, way, xy, reach)
-    assert loops.read(shares, z, way, xy, reach, found) == item
-    np.testing.assert_allclose(found, signs, rtol=1e-9)
+    found, reach = np.empty(5), np.array([15.0, 4.0, 30.0, 60.0])
+    item, signs = plain_read(shares, z, verifying, way, xy, reach)
+    assert loops.read(shares, z, verifying, way, xy, reach, found) == item
+    np.testing.assert_allclose(found, signs, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("many", [5, 6, 20, 301])

@@ -15,9 +15,10 @@ from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
 from evplace.matchers.bayes import Bayes
 from evplace.placemap import PlaceMap, add, calibrate, merge, named, parts_of, split, train, versions_of
-from evplace.placemap._parts import OVERLAP_M
+from evplace.placemap._parts import OVERLAP_M, JoinedRows
+from evplace.placemap._training import OwnRows
 from evplace.places import PlaceGrid, PlaceRuns
-from evplace.scorers import ComparesSome
+from evplace.scorers import ComparesSome, Verifies
 from evplace.sources.tracks import Track
 
 
@@ -80,6 +81,84 @@ def test_some_items_score_as_in_a_whole_row(scorer: str, bright: Traverse, dusk:
     assert isinstance(where, ComparesSome)
     whole = where.rows(dusk.images[:5])[:, items]
     np.testing.assert_allclose(where.some(dusk.images[:5], items), whole, atol=1e-5)
+
+
+@pytest.fixture(scope="session")
+def fused(bright: Traverse, dusk: Traverse) -> PlaceMap:
+    """Two drives by a scorer that verifies; a third of the second lies beyond the first."""
+    return add(train(bright, grid(bright), matcher="best"), moved(dusk, east=80.0))
+
+
+def best_of(place_map: PlaceMap, tables: list[np.ndarray]) -> np.ndarray:
+    """(n, items) from the tables (n, references) of each drive."""
+    found = np.full((len(tables[0]), len(place_map.items)), -np.inf, np.float32)
+    for part, table in zip(place_map.parts, tables, strict=True):
+        for item, column in zip(part.item, table.T, strict=True):
+            found[:, item] = np.maximum(found[:, item], column)
+    return found
+
+
+def test_what_verifies_an_item_is_the_best_of_its_references(fused: PlaceMap, dusk: Traverse) -> None:
+    where, images = fused.scoring(), dusk.images[:5]
+    assert isinstance(where, Verifies)
+    assert len(fused.items) > 120
+    alone = [part.map.scoring() for part in fused.parts]
+    each = [one.scored(images) for one in alone if isinstance(one, Verifies)]
+    scored = where.scored(images)
+    for found, tables in zip(scored, zip(*each, strict=True), strict=True):
+        np.testing.assert_array_equal(found, best_of(fused, list(tables)))
+    np.testing.assert_array_equal(scored.rows, where.rows(images))
+    items = np.array([150, 3, 70, 119, 3])
+    some = where.scored(images, items)
+    for found, whole in zip(some, scored, strict=True):
+        np.testing.assert_allclose(found, whole[:, items], atol=1e-4)
+    np.testing.assert_array_equal(some.rows, where.some(images, items))
+
+
+def test_where_no_drive_verifies_the_map_does_not(two: PlaceMap) -> None:
+    assert type(two.scoring()) is JoinedRows
+    assert not isinstance(two.scoring(), Verifies)
+    own = OwnRows(two)
+    assert own.route(np.nan).verifying is None
+
+
+def test_own_images_are_verified_by_all_but_themselves(fused: PlaceMap) -> None:
+    """Of both drives, one behind the other."""
+    own = OwnRows(fused)
+    route = own.route(np.nan)
+    assert route.own is not None
+    assert route.verifying is not None
+    many, part = len(route.own[0]), slice(len(route.own[0]) - 2, len(route.own[0]) + 2)
+    found = own.rows(part), route.verifying(part)
+    for row, (drive, at) in enumerate([(0, many - 2), (0, many - 1), (1, 0), (1, 1)]):
+        image = fused.parts[drive].map.images_of([at])
+        each = [part.map.scoring().scored(image) for part in fused.parts]
+        for rows, tables in zip(found, zip(*each, strict=True), strict=True):
+            least = min(table.min() for table in tables)
+            tables[drive][0, at] = least
+            np.testing.assert_array_equal(rows[row], best_of(fused, list(tables))[0])
+
+
+def test_own_images_of_one_drive_are_verified(bright: Traverse, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both are asked for, and scored once."""
+    own = OwnRows(train(bright, grid(bright), matcher="best"))
+    where, asked = own._scoring, list[int]()
+    assert isinstance(where, Verifies)
+    scored = where.scored
+
+    def counted(images: np.ndarray) -> object:
+        asked.append(len(images))
+        return scored(images)
+
+    monkeypatch.setattr(where, "scored", counted)
+    verifying = own.route(np.nan).verifying
+    assert verifying is not None
+    references = own._map.references
+    assert references is not None
+    wanted = scored(references[3:9])
+    np.testing.assert_array_equal(own.rows(slice(3, 9)), wanted.rows)
+    np.testing.assert_array_equal(verifying(slice(3, 9)), wanted.verifying)
+    assert asked == [6]
 
 
 def slow_street(seed: int, noise: float = 0.02) -> Traverse:

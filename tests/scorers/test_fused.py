@@ -14,7 +14,7 @@ from evplace.core.zscores import robust_z
 from evplace.imaging.traverse import Traverse
 from evplace.placemap import train
 from evplace.places import PlaceGrid, PlaceRuns
-from evplace.scorers import Learning
+from evplace.scorers import ComparesSome, Learning, Verifies
 from evplace.scorers.edges import Edges
 from evplace.scorers.fused import VERSIONS, Fused
 from evplace.scorers.trained import Trained
@@ -46,6 +46,72 @@ def test_rows_are_the_sum_of_both_parts_by_weights(day: Traverse, places: PlaceG
         for image in queries
     ]
     np.testing.assert_allclose(rows, wanted, atol=3e-2)
+
+
+def opened(part: Fused, day: Traverse, places: PlaceGrid) -> Verifies:
+    found = part.open(part.learn(day, places, Learning()).content)
+    assert isinstance(found, Verifies)
+    return found
+
+
+SOME = np.array([41, 3, 3, 20])
+
+
+@pytest.mark.parametrize("every", [1, 6])
+def test_edges_alone_verify_what_both_find(
+    day: Traverse, night: Traverse, places: PlaceGrid, every: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As z-scores of their own; where every so many-th of them tells what is usual, too."""
+    monkeypatch.setattr("evplace.core.zscores.MOST_ORDERED", len(day) // every)
+    content = Fused().learn(day, places, Learning()).content
+    basis, vectors = np.asarray(content["edges_basis"]), np.asarray(content["edges_vectors"])
+    images = night.images[::9]
+    where = opened(Fused(), day, places)
+    rows, verifying = where.scored(images)
+    alone = (Edges().describe(images) @ basis) @ vectors.T
+    np.testing.assert_allclose(verifying, [robust_z(row) for row in alone], atol=1e-4)
+    assert np.abs(rows - verifying).max() > 0.5
+    some = where.scored(images, SOME)
+    np.testing.assert_allclose(some.verifying, verifying[:, SOME], atol=1e-4)
+    np.testing.assert_allclose(some.rows, rows[:, SOME], atol=1e-4)
+
+
+@pytest.mark.parametrize("settings", [Fused(), Fused(trained=False), Fused(index="int8")])
+def test_what_verifies_comes_with_the_same_rows(
+    settings: Fused, day: Traverse, night: Traverse, places: PlaceGrid
+) -> None:
+    """To the bit, of all items or some, whatever other images are asked about at once."""
+    images = night.images[::9]
+    where = opened(settings, day, places)
+    assert isinstance(where, ComparesSome)
+    for items in (None, SOME):
+        rows, verifying = where.scored(images, items)
+        alone = where.rows(images) if items is None else where.some(images, items)  # type: ignore[attr-defined]
+        np.testing.assert_array_equal(rows, alone)
+        assert rows.shape == verifying.shape == (len(images), len(day) if items is None else len(SOME))
+        assert rows.dtype == verifying.dtype == np.float32
+        for at in range(len(images)):
+            one = where.scored(images[at : at + 1], items)
+            np.testing.assert_array_equal(one.rows[0], rows[at])
+            np.testing.assert_array_equal(one.verifying[0], verifying[at])
+
+
+def test_edges_alone_verify_themselves(day: Traverse, night: Traverse, places: PlaceGrid) -> None:
+    where = opened(Fused(trained=False), day, places)
+    for items in (None, SOME):
+        rows, verifying = where.scored(night.images[::9], items)
+        np.testing.assert_allclose(verifying, rows, atol=1e-5)
+
+
+@pytest.mark.parametrize("index", ["int8", "bits"])
+def test_with_an_index_edges_verify_nearly_as_well(
+    index: str, day: Traverse, night: Traverse, places: PlaceGrid
+) -> None:
+    images = night.images[::9]
+    wanted = opened(Fused(), day, places).scored(images).verifying
+    where = opened(Fused(index=index), day, places)
+    np.testing.assert_allclose(where.scored(images).verifying, wanted, atol=0.1)
+    np.testing.assert_allclose(where.scored(images, SOME).verifying, wanted[:, SOME], atol=0.1)
 
 
 def test_a_reference_a_metre_and_none_of_a_camera_that_stands(day: Traverse, places: PlaceGrid) -> None:

@@ -22,7 +22,7 @@ from evplace.localizer import Localizer
 from evplace.placemap import PlaceMap, train
 from evplace.places import PlaceGrid
 from evplace.scorers import _indexed
-from evplace.scorers._compressed import compress
+from evplace.scorers._compressed import Compressed, compress
 from evplace.scorers._indexed import IndexedRows, indexed, scale
 from evplace.scorers.fused import Fused
 from evplace.searchers import ABOUT
@@ -50,33 +50,34 @@ def references() -> Any:
     return (vectors / np.linalg.norm(vectors, axis=1, keepdims=True)).astype(np.float32)
 
 
-def content(references: Any, index: str) -> dict[str, Any]:
-    found = {name: compress(part.describe(references), 20) for name, part in PARTS.items()}
-    return indexed(found, WEIGHTS, index)
+@pytest.fixture(scope="module")
+def compressed(references: Any) -> dict[str, Compressed]:
+    return {name: compress(part.describe(references), 20) for name, part in PARTS.items()}
 
 
-def whole_row(references: Any, image: Any) -> Any:
+def part_row(compressed: dict[str, Compressed], name: str, image: Any) -> Any:
+    """The z-scores of one descriptor by all references."""
+    return robust_z(compressed[name].rows(PARTS[name].describe(image[None]))[0])
+
+
+def whole_row(compressed: dict[str, Compressed], image: Any) -> Any:
     """The z-scores that all references together give."""
-    total = 0
-    for name, part in PARTS.items():
-        total = total + WEIGHTS[name] * robust_z(
-            compress(part.describe(references), 20).rows(part.describe(image[None]))[0]
-        )
+    total = sum(weight * part_row(compressed, name, image) for name, weight in WEIGHTS.items())
     return robust_z(np.asarray(total))
 
 
 @pytest.mark.parametrize("index", sorted(set(families.names("searchers")) - {"faiss"}))
 def test_z_scores_of_what_is_listed_are_those_of_a_whole_row(
-    references: Any, index: str, monkeypatch: pytest.MonkeyPatch
+    references: Any, compressed: dict[str, Compressed], index: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What tells the scale is exact as well, so that a matcher makes the same z-scores of it again."""
     monkeypatch.setattr(_indexed, "LISTED", 100)
-    opened = IndexedRows(PARTS, WEIGHTS, content(references, index), ITEMS)
+    opened = IndexedRows(PARTS, WEIGHTS, indexed(compressed, WEIGHTS, index), ITEMS)
     near = {"exact": 1e-4}.get(index, 0.06)
     rng = np.random.default_rng(1)
     for item in (0, 77, 4999):
         image = (references[item] + 0.02 * rng.standard_normal(70)).astype(np.float32)
-        wanted, row = whole_row(references, image), opened.rows(image[None])[0]
+        wanted, row = whole_row(compressed, image), opened.rows(image[None])[0]
         listed = np.flatnonzero(row)
         assert row.max() >= np.sort(wanted)[-10] - near
         np.testing.assert_allclose(row[listed], wanted[listed], atol=near)
@@ -86,6 +87,25 @@ def test_z_scores_of_what_is_listed_are_those_of_a_whole_row(
             not_seen = set(np.arange(ITEMS)[ordered(ITEMS)]) - set(listed)
             assert len(not_seen) <= 1  # the median, which may be 0
             assert ITEMS // 2 < len(listed) <= ITEMS // 2 + 100
+
+
+@pytest.mark.parametrize("index", sorted(set(families.names("searchers")) - {"faiss"}))
+def test_what_verifies_is_of_the_first_descriptor_alone(
+    references: Any, compressed: dict[str, Compressed], index: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of what is listed and of what tells the scale; all else is usual."""
+    monkeypatch.setattr(_indexed, "LISTED", 100)
+    opened = IndexedRows(PARTS, WEIGHTS, indexed(compressed, WEIGHTS, index), ITEMS)
+    near = {"exact": 1e-4}.get(index, 0.1)
+    image = references[77:78] + 0.02 * np.random.default_rng(1).standard_normal((1, 70)).astype(np.float32)
+    wanted = part_row(compressed, "one", image[0])
+    rows, verifying = (one[0] for one in opened.scored(image))
+    listed = np.flatnonzero(rows)
+    np.testing.assert_allclose(verifying[listed], wanted[listed], atol=near)
+    np.testing.assert_allclose(robust_z(verifying)[listed], wanted[listed], atol=near)
+    np.testing.assert_allclose(opened.scored(image, listed).verifying[0], wanted[listed], atol=near)
+    unseen = np.setdiff1d(np.arange(ITEMS), [*listed, *np.arange(ITEMS)[ordered(ITEMS)]])
+    assert (verifying[unseen] == 0).all()
 
 
 @given(st.integers(2, 60), st.integers(0, 99), st.floats(0.1, 3))

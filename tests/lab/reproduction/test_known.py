@@ -6,38 +6,75 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from evplace.core.errors import SettingsError
+from evplace.core.storage import write_json
+from evplace.matchers import _known
+from evplace.matchers._known import Judges, said
 from evplace_lab.reproduction import Choice, known
 
+SHARE_SLOW = 0.4
+"""Of the answers of a made drive, those of a slow camera."""
 
-def drive(town: int, seed: int, weights: list[float]) -> known.Drive:
+
+def camera(town: int, sensor: str = "ideal") -> known.Camera:
+    return known.Camera(town, sensor, "ten images a second")
+
+
+def made_features(rng: np.random.Generator, many: int) -> NDArray[np.float64]:
+    return rng.standard_normal((many, 2)) * [1.0, 3.0] + [0.5, -2.0]
+
+
+def drive(town: int, seed: int, weights: list[float], sensor: str = "ideal") -> known.Drive:
     """Answers that are right with the probability that these weights say."""
     rng = np.random.default_rng(seed)
-    features = rng.standard_normal((20_000, len(weights) - 1)) * [1.0, 3.0] + [0.5, -2.0]
+    features = made_features(rng, 20_000)
     right = rng.random(len(features)) < 1 / (1 + np.exp(-(weights[0] + features @ weights[1:])))
-    both = {"live": features, "late": features}
-    answers = known.Answers(both, {"live": right, "late": right}, rng.random(len(right)) < 0.7)
-    return known.Drive(town, "ideal", "night-1", whole=True, answers=answers)
+    there, slow = rng.random(len(right)) < 0.7, rng.random(len(right)) < SHARE_SLOW
+    answers = known.Answers({"live": features, "late": features}, {"live": right, "late": right}, there, slow)
+    return known.Drive(camera(town, sensor), "night-1", whole=True, answers=answers)
 
 
 def test_the_weights_are_found_that_the_answers_follow() -> None:
+    """By the regression they are read off; the trees say much the same."""
     wanted = [-0.4, 1.5, -0.5]
-    np.testing.assert_allclose(known._fitted([drive(1, 0, wanted)], "live"), wanted, atol=0.08)
+    found = known._fitted([drive(1, 0, wanted)], "live")
+    np.testing.assert_allclose(found.slow, wanted, atol=0.08)
+    features = made_features(np.random.default_rng(5), 2000)
+    apart = said(found, features, slow=False) - said(found, features, slow=True)
+    assert np.abs(apart).mean() < 0.03
+
+
+def test_trees_are_of_quick_cameras_and_the_regression_of_events_alone() -> None:
+    """Slow answers, and those on colour, that say the opposite change not the one and not the other."""
+    wanted, opposite = [0.0, 2.0, 0.0], [0.0, -2.0, 0.0]
+    one, other = drive(1, 0, wanted), drive(1, 1, opposite)
+    slow = other.answers._replace(slow=np.ones(20_000, np.bool_))
+    colour = other.answers._replace(slow=np.zeros(20_000, np.bool_))
+    high = np.array([[2.0, -2.0]])
+
+    def says(answers: known.Answers, sensor: str, slow: bool) -> float:
+        drives = [one, known.Drive(camera(1, sensor), "night-1", True, answers)]
+        return float(said(known._fitted(drives, "live"), high, slow)[0])
+
+    assert says(slow, "ideal", slow=False) > 0.9
+    assert says(colour, "ideal", slow=False) < 0.8
+    assert says(colour, known.COLOUR, slow=True) > 0.9
+    assert says(slow, "ideal", slow=True) < 0.8
 
 
 def test_a_town_is_judged_by_the_weights_of_the_others() -> None:
     drives = [drive(1, 0, [0.0, 2.0, 0.0]), drive(2, 1, [0.0, -2.0, 0.0])]
-    features = np.random.default_rng(2).standard_normal((5000, 2)) * [1.0, 3.0] + [0.5, -2.0]
-    own = known.Own(1, "ideal", {"live": features, "late": features})
+    features = made_features(np.random.default_rng(2), 5000)
+    own = known.Own(camera(1), {"live": features, "late": features})
     (row,) = known._judged(drives, [own], 1)
-    assert (row["town"], row["sensor"], row["query"]) == (1, "ideal", "night-1")
-    weights = known._fitted(drives[1:], "live")
-    assert weights[1] < 0  # the other town's weights point the other way
+    assert [row[name] for name in ("town", "sensor", "way", "query")] == [*camera(1), "night-1"]
+    judges = known._fitted(drives[1:], "live")
+    assert judges.slow[1] < 0  # the other town's weights point the other way
     one = drives[0].answers
-    said = known._said(one.features["live"], weights)
-    limit = np.quantile(known._said(features, weights), 0.99)
-    accepted = said > limit
+    limits = [np.quantile(said(judges, features, slow), 0.99) for slow in (False, True)]
+    accepted = said(judges, one.features["live"], one.slow) > np.where(one.slow, limits[1], limits[0])
     good = np.where(one.known, one.right["live"] & accepted, ~accepted)
     assert row["live"]["the map"]["accuracy"] == pytest.approx(100 * good.mean())
     assert row["live"]["the map"]["false_accepts"] == pytest.approx(100 * accepted[~one.known].mean())
@@ -45,11 +82,34 @@ def test_a_town_is_judged_by_the_weights_of_the_others() -> None:
 
 
 def test_a_threshold_is_the_maps_own_or_that_of_other_towns() -> None:
-    drives = [drive(1, 0, [0.0, 2.0, 0.0]), drive(2, 1, [0.0, 2.0, 0.0])]
-    sure = known.Own(1, "ideal", dict.fromkeys(known.KINDS, np.full((200, 2), 3.0)))
-    limits = known._thresholds(sure, drives[1:], "late", known._fitted(drives[1:], "late"))
-    said = known._said(np.full((1, 2), 3.0), known._fitted(drives[1:], "late"))
-    assert limits["other towns"] < limits["the map"] == pytest.approx(said[0])
+    """One for quick cameras and one for slow ones; 1 where the other towns have none such."""
+    other = drive(2, 1, [0.0, 2.0, 0.0])
+    sure = known.Own(camera(1), dict.fromkeys(known.KINDS, np.full((200, 2), 3.0)))
+    judges = known._fitted([other], "late")
+    limits = known._thresholds(sure, [other], "late", judges)
+    wanted = [said(judges, np.full((1, 2), 3.0), slow)[0] for slow in (False, True)]
+    assert limits["the map"] == pytest.approx(np.array(wanted))
+    assert limits["other towns"][1] < limits["the map"][1]  # trees go on no further than they have seen
+    unknown = ~other.answers.known & ~other.answers.slow
+    quick = said(judges, other.answers.features["late"][unknown], slow=False)
+    assert limits["other towns"][0] == pytest.approx(np.quantile(quick, 0.99))
+    all_quick = other.answers._replace(slow=np.zeros(20_000, np.bool_))
+    assert known._elsewhere([known.Drive(camera(2), "q", True, all_quick)], "late", judges)[1] == 1.0
+
+
+def test_weights_that_are_written_are_those_that_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the digits that are kept."""
+    fitted = {kind: known._fitted([drive(1, 0, [0.1, 1.0, 0.3])], kind) for kind in known.KINDS}
+    write_json(tmp_path / "weights.json", {kind: known._plain(judges) for kind, judges in fitted.items()})
+    monkeypatch.setattr(_known, "WEIGHTS", tmp_path / "weights.json")
+    features = made_features(np.random.default_rng(3), 500)
+    for judges, kind in zip(_known.judges.__wrapped__(), known.KINDS, strict=True):
+        assert isinstance(judges, Judges)
+        for slow in (False, True):
+            kept, whole = (said(one, features, slow) for one in (judges, fitted[kind]))
+            np.testing.assert_allclose(kept, whole, atol=1e-4)
 
 
 def test_settings_of_a_training_mean_nothing(tmp_path: Path) -> None:
