@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from evplace.matchers import _known
 from evplace.matchers._belief import SPEEDS
 from evplace.matchers._known import (
+    ASKED,
     LATE_SIGNS,
     LONGER,
     SIGNS,
@@ -21,6 +22,7 @@ from evplace.matchers._known import (
     Judges,
     Means,
     Trees,
+    limit,
     means_ahead,
     means_of,
     of_late,
@@ -134,7 +136,7 @@ def test_the_last_sign_is_how_sure_the_speed_is() -> None:
 
 def made_judges(seed: int, features: int) -> Judges:
     rng = np.random.default_rng(seed)
-    return Judges(made_trees(rng, features), rng.normal(size=1 + features))
+    return Judges(made_trees(rng, features), rng.normal(size=1 + features), np.zeros((2, len(ASKED))))
 
 
 @pytest.fixture
@@ -150,7 +152,7 @@ def test_each_image_is_judged_by_trees_or_by_the_regression(
     judged: tuple[Judges, Judges], late: bool
 ) -> None:
     """Whichever camera it is of; live and late answers each by their own."""
-    quick, slow = judged[late]
+    quick, slow, _ = judged[late]
     features = np.random.default_rng(3).normal(size=(9, len(slow) - 1))
     is_slow = np.arange(9) % 3 == 0
     log_odds = np.where(is_slow, slow[0] + features @ slow[1:], quick.log_odds(features))
@@ -184,6 +186,27 @@ def test_features_are_as_many_as_the_shipped_weights() -> None:
 def test_the_shipped_file_is_as_small_as_it_says() -> None:
     """Live and late answers and no more; few digits, since the package carries it."""
     held = json.loads(_known.WEIGHTS.read_text())
+    assert held.pop("format") == "evplace-known-2"
     assert set(held) == {"live", "late"}
-    assert all(set(one) == {"start", "feature", "limit", "says", "slow"} for one in held.values())
+    assert all(set(one) == {"start", "feature", "limit", "says", "slow", "usual"} for one in held.values())
     assert _known.WEIGHTS.stat().st_size < 200_000
+
+
+@pytest.mark.parametrize("slow", [False, True])
+def test_a_limit_lies_halfway_between_the_map_and_other_towns(slow: bool) -> None:
+    """By the log-odds; where the map has never said anything, or is sure, it is still a probability."""
+    by = made_judges(0, LIVE_FEATURES)._replace(usual=np.stack([-np.log(ASKED), -2 * np.log(ASKED)]))
+    unknown = np.linspace(0, 1, 1001)
+    for asked in (1e-4, 0.01, 0.02, 0.5):
+        own, other = np.quantile(unknown, 1 - asked), -(1 + slow) * np.log(asked)
+        found = limit(unknown, by, slow, asked)
+        assert np.log(found / (1 - found)) == pytest.approx((np.log(own / (1 - own)) + other) / 2)
+    assert 0 < limit(np.zeros(5), by, slow, 0.01) < limit(np.ones(5), by, slow, 0.01) < 1
+    limits = [limit(unknown, by, slow, asked) for asked in (0.3, 0.1, 0.03, 0.01, 0.003, 0.0002)]
+    assert limits == sorted(limits)
+
+
+def test_other_towns_need_more_the_less_is_asked_for() -> None:
+    for judges in _known.judges():
+        assert (np.diff(judges.usual, axis=1) <= 0).all()
+        assert judges.usual.shape == (2, len(ASKED))

@@ -297,12 +297,13 @@ def _right(query: Traverse, position: Floats, heading_deg: Floats) -> Bools:
 def _fitted(drives: list[Drive], kind: str) -> Judges:
     """What judges answers of a kind, and what it says of images of places that maps lack.
 
-    The latter by what is fitted without their town: of its own towns it would say too little.
+    The latter by what is fitted without their town, where there are others: it would say too little of its
+    own.
     """
     towns = list(dict.fromkeys(drive.camera.town for drive in drives))
     unknown: list[tuple[Floats, Bools]] = []
     for town in towns:
-        judges = _judges([one for one in drives if one.camera.town != town], kind)
+        judges = _judges([one for one in drives if one.camera.town != town] or drives, kind)
         there = [one.answers for one in drives if one.camera.town == town]
         unknown += [(_unknown(one, kind, judges), one.slow[~one.known]) for one in there]
     found, slow = (np.concatenate(column) for column in zip(*unknown, strict=True))

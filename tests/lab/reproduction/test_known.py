@@ -81,20 +81,23 @@ def test_a_town_is_judged_by_the_weights_of_the_others() -> None:
     assert row["live"]["the map"]["false_accepts"] == pytest.approx(1, abs=0.5)
 
 
-def test_a_threshold_is_the_maps_own_or_that_of_other_towns() -> None:
-    """One for quick cameras and one for slow ones; 1 where the other towns have none such."""
-    other = drive(2, 1, [0.0, 2.0, 0.0])
+def test_a_threshold_is_the_maps_own_or_that_of_other_towns_or_halfway() -> None:
+    """One for quick cameras and one for slow ones; other towns are judged by each other."""
+    others = [drive(2, 1, [0.0, 2.0, 0.0]), drive(3, 2, [0.0, 2.0, 0.0])]
     sure = known.Own(camera(1), dict.fromkeys(known.KINDS, np.full((200, 2), 3.0)))
-    judges = known._fitted([other], "late")
-    limits = known._thresholds(sure, [other], "late", judges)
+    judges = known._fitted(others, "late")
+    limits = known._thresholds(sure, "late", judges)
     wanted = [said(judges, np.full((1, 2), 3.0), slow)[0] for slow in (False, True)]
     assert limits["the map"] == pytest.approx(np.array(wanted))
-    assert limits["other towns"][1] < limits["the map"][1]  # trees go on no further than they have seen
-    unknown = ~other.answers.known & ~other.answers.slow
-    quick = said(judges, other.answers.features["late"][unknown], slow=False)
-    assert limits["other towns"][0] == pytest.approx(np.quantile(quick, 0.99))
-    all_quick = other.answers._replace(slow=np.zeros(20_000, np.bool_))
-    assert known._elsewhere([known.Drive(camera(2), "q", True, all_quick)], "late", judges)[1] == 1.0
+    held_out = known._judges(others[1:], "late"), known._judges(others[:1], "late")
+    for slow in (False, True):
+        unknown = [
+            one.answers.features["late"][~one.answers.known & (one.answers.slow == slow)] for one in others
+        ]
+        each = [said(by, features, slow) for by, features in zip(held_out, unknown, strict=True)]
+        assert limits["other towns"][int(slow)] == pytest.approx(np.quantile(np.concatenate(each), 0.99))
+    odds = {name: np.log(found / (1 - found)) for name, found in limits.items()}
+    assert odds[known.USED] == pytest.approx((odds["the map"] + odds["other towns"]) / 2)
 
 
 def test_weights_that_are_written_are_those_that_are_read(
