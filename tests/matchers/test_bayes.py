@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,12 +11,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from evplace.core.errors import PlaceMapError, SettingsError
-from evplace.matchers import Answer, Route, Seen
+from evplace.matchers import Answer, Continuing, Learned, Route, Seen, _calibration, _known
 from evplace.matchers import _belief as belief
 from evplace.matchers import _route_filter as loops
+from evplace.matchers import _surroundings as around
 from evplace.matchers import _traces as traces
-from evplace.matchers._calibration import LATE, LIVE, SLOW
-from evplace.matchers._known import LATE_SIGNS, LONGER, SIGNS, SPANS, Means, joined, of_live
+from evplace.matchers._calibration import LATE, LIVE, SLOW, UNKNOWN, strangers
+from evplace.matchers._known import LATE_SIGNS, LONGER, SIGNS, SPANS, Judges, Means, Trees, joined, of_live
 from evplace.matchers._ways import Ways
 from evplace.matchers.bayes import Bayes
 from evplace.testing import check_matcher
@@ -363,6 +366,215 @@ def test_what_was_learned_must_be_what_is_learned() -> None:
     ):
         with pytest.raises(PlaceMapError, match="calibrate"):
             Bayes().follow(route._replace(learned=learned | {name: wrong}))
+
+
+def constant(quick: float, slow: float, features: int) -> Judges:
+    """Whatever an answer looks like, it is right with one probability or the other."""
+    start, intercept = np.log(quick / (1 - quick)), np.log(slow / (1 - slow))
+    nothing = np.zeros((1, 1), np.int64), np.zeros((1, 1)), np.zeros((1, 2))
+    return Judges(Trees(float(start), *nothing), intercept * np.eye(1 + features)[0])
+
+
+MANY = (SIGNS * len(SPANS), LATE_SIGNS * len(SPANS) + len(LONGER) + SIGNS * len(SPANS))
+"""Features of a live answer, and of a late one."""
+SAID = {"live": (0.4, 0.6), "late": (0.3, 0.7)}
+"""Of quick images and of slow ones."""
+WAYS = ["live", "lag", "hindsight"]
+
+
+@pytest.fixture
+def constants(monkeypatch: pytest.MonkeyPatch) -> None:
+    both = tuple(constant(*said, many) for said, many in zip(SAID.values(), MANY, strict=True))
+    monkeypatch.setattr(_known, "judges", lambda: both)
+
+
+def measured_as(**values: float) -> Learned:
+    """What a map may have learned, with all that it says of places it lacks alike."""
+    unknown = {name: np.full(9, values.get(name, 0.5)) for name in UNKNOWN}
+    return {belief.WRONG: around.USUAL, belief.CONTENT: np.array([50.0]), **unknown}
+
+
+@pytest.fixture
+def cut_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A map is measured quickly."""
+    monkeypatch.setattr(_calibration, "TRIALS", (2, 2))
+
+
+def judged(way: str, route: Route, rows: NDArray[np.float32], seen: list[Seen]) -> tuple[Floats, list[bool]]:
+    """The probabilities and what is accepted, live, with a lag or in hindsight."""
+    if way == "hindsight":
+        path = Bayes().in_hindsight(route, rows, seen)
+        return path.score, path.accepted.tolist()
+    answers = drive(Bayes(lag_s=0.0 if way == "live" else 1.0), route, rows, seen)
+    return np.array([answer.score for answer in answers]), [answer.accepted for answer in answers]
+
+
+TIMES_S = np.array([0.0, 0.1, 0.2, 0.7, 0.8, 1.3, 3.0, 3.4])
+IS_SLOW = np.array([False, False, False, True, False, True, True, False])
+"""Half a second and more after the one before it."""
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(("quick", "slow"), [(0.2, 0.9), (0.9, 0.2), (0.35, 0.65), (0.2, 0.2)])
+def test_images_of_a_slow_camera_have_their_own_judge_and_threshold(
+    way: str, quick: float, slow: float, constants: None
+) -> None:
+    route, kind = road(60), LIVE if way == "live" else LATE
+    learned = measured_as(**{kind: quick, kind + SLOW: slow})
+    seen = [Seen(round(time * 1e6), 50.0) for time in TIMES_S]
+    rows = rows_along(route, 5 + 5 * TIMES_S)
+    right, accepted = judged(way, route._replace(learned=learned), rows, seen)
+    wanted = np.where(IS_SLOW, *SAID["live" if way == "live" else "late"][::-1])
+    np.testing.assert_allclose(right, wanted)
+    assert accepted == (wanted > np.where(IS_SLOW, slow, quick)).tolist()
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_threshold_that_is_set_is_that_of_all(way: str, constants: None) -> None:
+    seen = [Seen(round(time * 1e6), 50.0) for time in TIMES_S]
+    route = road(60)._replace(learned=measured_as())
+    rows = rows_along(route, 5 + 5 * TIMES_S)
+    settings = Bayes(threshold=0.5, lag_s=1.0 if way == "lag" else 0.0)
+    if way == "hindsight":
+        accepted = settings.in_hindsight(route, rows, seen).accepted.tolist()
+    else:
+        accepted = [answer.accepted for answer in drive(settings, route, rows, seen)]
+    assert accepted == IS_SLOW.tolist()
+
+
+def test_a_map_is_measured_for_quick_and_for_slow_cameras(constants: None, cut_twice: None) -> None:
+    learned = calibrated(road()).learned
+    assert learned is not None
+    for name, said in ((LIVE, SAID["live"]), (LATE, SAID["late"])):
+        for kind, wanted in zip((name, name + SLOW), said, strict=True):
+            np.testing.assert_allclose(learned[kind], wanted)
+            assert len(learned[kind]) == len(learned[LIVE])
+    assert set(UNKNOWN) < set(learned)
+
+
+def test_what_is_measured_of_more_comes_to_each_of_four(constants: None, cut_twice: None) -> None:
+    route = calibrated(road())
+    before, own = route.learned or {}, own_rows(route)
+    more = Bayes().learn_more(before, route, lambda part: own[part])
+    assert [len(more[name]) for name in UNKNOWN] == [2 * len(before[name]) for name in UNKNOWN]
+    for name in UNKNOWN:
+        np.testing.assert_array_equal(np.unique(more[name]), np.unique(before[name]))
+
+
+@pytest.mark.parametrize("way", [*WAYS, "more"])
+def test_a_map_that_an_earlier_version_measured_is_to_be_calibrated(way: str, cut_twice: None) -> None:
+    route = road()
+    own, learned = own_rows(route), measured_as()
+    earlier = {name: values for name, values in learned.items() if not name.endswith(SLOW)}
+    assert len(earlier) == len(learned) - 2
+    with pytest.raises(PlaceMapError, match=r"measure it again, with evplace calibrate$") as told:
+        if way == "more":
+            Bayes().learn_more(earlier, route, lambda part: own[part])
+        else:
+            judged(way, route._replace(learned=earlier), own[:3], at_rate(3, 10))
+    assert "earlier evplace" in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def verifying_alone(features: int) -> Judges:
+    """What verifies the image above 2: right; else wrong. The same of slow cameras, less sharply."""
+    trees = Trees(0.0, np.array([[VERIFIES]]), np.array([[2.0]]), np.array([[-3.0, 3.0]]))
+    return Judges(trees, np.eye(1 + features)[1 + VERIFIES])
+
+
+VERIFIES = 3 * len(SPANS)
+"""The feature that is what verifies the image itself."""
+
+
+@pytest.fixture
+def by_what_verifies(monkeypatch: pytest.MonkeyPatch) -> None:
+    both = tuple(verifying_alone(many) for many in MANY)
+    monkeypatch.setattr(_known, "judges", lambda: both)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("rate", [10, 1])
+def test_one_descriptor_verifies_what_all_together_find(
+    way: str, rate: float, by_what_verifies: None
+) -> None:
+    """At the item that is found; without one, the scores themselves do."""
+    route = road(100)
+    on = 20 + np.arange(30) * 2.5 / rate
+    rows, seen = rows_along(route, on), at_rate(30, rate)
+    good = np.arange(30) % 3 == 0
+    there = np.abs(np.arange(100) - on[:, None]) < 3
+    verifying = np.where(there & good[:, None], 4.0, np.where(there, 1.0, 9.0)).astype(np.float32)
+    told = [one._replace(verifying=row) for one, row in zip(seen, verifying, strict=True)]
+    right, _ = judged(way, route, rows, told)
+    slow = np.arange(30) > 0 if rate == 1 else np.zeros(30, np.bool_)
+    log_odds = np.where(slow, np.where(good, 4.0, 1.0), np.where(good, 3.0, -3.0))
+    np.testing.assert_allclose(right[3:], (1 / (1 + np.exp(-log_odds)))[3:], rtol=1e-6)
+    alone, _ = judged(way, route, rows, seen)
+    assert (alone[3:] > 0.9).all()
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 1.0])
+def test_images_that_wait_keep_what_verifies_them(lag_s: float, by_what_verifies: None) -> None:
+    """On the same items in the same order, nothing changes; of others, each has its own."""
+    route = road(100)
+    rows, seen = rows_along(route, 20 + np.arange(30) / 2), at_rate(30, 10)
+    verifying = np.random.default_rng(2).normal(2.0, 2.0, (30, 100)).astype(np.float32)
+    seen = [one._replace(verifying=row) for one, row in zip(seen, verifying, strict=True)]
+    wanted = drive(Bayes(lag_s=lag_s), route, rows, seen)
+    following, found = Bayes(lag_s=lag_s).follow(route), list[Answer]()
+    for at, (row, one) in enumerate(zip(rows, seen, strict=True)):
+        if at == 15:
+            assert isinstance(following, Continuing)
+            following = following.continued(route, np.arange(100))
+        found += following.step(row, one)
+    found += following.finish()
+    assert [answer.item for answer in found] == [answer.item for answer in wanted]
+    np.testing.assert_allclose([one.score for one in found], [one.score for one in wanted], rtol=1e-4)
+    assert len({answer.score for answer in found}) > 1
+
+
+def test_what_verifies_images_that_wait_is_renumbered() -> None:
+    route, rows = road(100), rows_along(road(100), np.arange(5.0))
+    following = Bayes(lag_s=10).follow(route)
+    seen = [one._replace(verifying=row + 1) for one, row in zip(at_rate(5, 10), rows, strict=True)]
+    for row, one in zip(rows, [*seen[:4], seen[4]._replace(verifying=None)], strict=True):
+        following.step(row, one)
+    assert isinstance(following, Continuing)
+    other = following.continued(road(3)._replace(left_out=97), np.array([7, -1, 2]))
+    waiting = vars(other)["_waiting"]
+    for row, one in zip(rows[:4], waiting, strict=False):
+        np.testing.assert_array_equal(one.verifying, [row[7] + 1, 0, row[2] + 1])
+    assert waiting[4].verifying is None
+
+
+def test_a_map_is_measured_by_what_verifies_its_own_images(cut_twice: None) -> None:
+    """Of each drive's, and of no image by itself."""
+    route = road()
+    own = own_rows(route)
+    flat = np.full((300, 300), 3.0, np.float32)
+    np.fill_diagonal(flat, 90.0)
+    for verifying, told in ((lambda part: flat[part], 3.0), (None, None)):
+        found = strangers(route._replace(verifying=verifying), lambda part: own[part])
+        assert found is not None
+        for features in (found.live, found.late):
+            wanted = features[:, 0] if told is None else np.full(len(features), told)
+            np.testing.assert_allclose(features[:, VERIFIES], wanted, rtol=1e-6)
+
+
+def test_of_several_drives_each_has_what_verifies_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    route = road()
+    drives = [np.arange(120), np.arange(0, 200, 2)]
+    rows = np.random.default_rng(0).standard_normal((220, 300)).astype(np.float32)
+    told = list[tuple[int, bool]]()
+
+    def noted(route: Route, whole: Ways, at: Any, own: Any, verifying: Any, *_: object) -> Any:
+        told.append((len(at), bool((verifying == -own).all() and len(own) == len(at))))
+        return np.zeros((60, MANY[0])), np.zeros((60, MANY[1]))
+
+    monkeypatch.setattr(_calibration, "_trial", noted)
+    given = route._replace(own=drives, verifying=lambda part: -rows[part])
+    assert strangers(given, lambda part: rows[part].copy()) is not None
+    assert set(told) == {(120, True), (100, True)}
 
 
 def test_settings_that_cannot_be_are_refused() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,11 +12,14 @@ from evplace.core import families
 from evplace.core.zscores import robust_z
 from evplace.matchers import Answer, Matcher, Route, Seen
 from evplace.matchers._answering import RISE, Reader
+from evplace.matchers._known import LATE_SIGNS, LONGER, SIGNS, SPANS, Judges, Trees
 from evplace.matchers._parts import InParts
 from evplace.matchers._ways import Ways
 from evplace.matchers.bayes import Bayes
 
 ITEMS = 5000
+VERIFIES = 3
+"""The number of the sign of what verifies."""
 
 
 def road(items: int = ITEMS) -> Route:
@@ -39,8 +44,20 @@ def matched(
     found = []
     for row, one, items in zip(rows, seen, regions, strict=True):
         wanted = parts.within(items)
-        found += parts.step(row if wanted is None else row[wanted], one)
+        if wanted is not None:
+            row, one = row[wanted], one._replace(verifying=_of(one.verifying, wanted))
+        found += parts.step(row, one)
     return found + parts.finish()
+
+
+def _of(row: NDArray[np.float32] | None, items: NDArray[np.int64]) -> NDArray[np.float32] | None:
+    return None if row is None else row[items]
+
+
+def verified(seen: list[Seen]) -> list[Seen]:
+    """With rows that verify, other for each image."""
+    rows = np.random.default_rng(3).standard_normal((len(seen), ITEMS)).astype(np.float32) + 2
+    return [one._replace(verifying=row) for one, row in zip(seen, rows, strict=True)]
 
 
 def windows(queries: int, every: int, start: int = 2000) -> list[NDArray[np.int64] | None]:
@@ -49,9 +66,94 @@ def windows(queries: int, every: int, start: int = 2000) -> list[NDArray[np.int6
     return [np.arange(middle - 150, middle + 150) for middle in middles]
 
 
+@pytest.fixture
+def by_what_verifies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Answers are judged by what verifies them alone: the mean of the last images' sign."""
+    last = VERIFIES * len(SPANS) + 1
+    nothing = Trees(0.0, np.zeros((1, 1), np.int64), np.zeros((1, 1)), np.zeros((1, 2)))
+    live, late = np.zeros(1 + SIGNS * len(SPANS)), np.zeros(1 + LATE_SIGNS * len(SPANS) + len(LONGER))
+    live[1 + last] = late[1 + last] = 1.0
+    late = np.concatenate([late, np.zeros(SIGNS * len(SPANS))])
+    both = Judges(nothing, live), Judges(nothing, late)
+    monkeypatch.setattr("evplace.matchers._known.judges", lambda: both)
+    monkeypatch.setattr("evplace.matchers._belief.FAR_APART_S", 0.0)
+
+
+class Noting:
+    """A matcher that keeps what it sees; whether it goes on with other items, is said."""
+
+    causal = True
+
+    def __init__(self, continuing: bool) -> None:
+        self._continuing = continuing
+        self.seen: list[tuple[NDArray[np.float32], Seen]] = []
+
+    def follow(self, _: Route, distances: bool = False) -> Any:
+        return _Continuing(self) if self._continuing else _Following(self)
+
+    def learn(self, _: Route, rows: Any) -> Any: ...
+
+    def in_hindsight(self, _: Route, rows: Any, seen: Any) -> Any: ...
+
+
+class _Following:
+    def __init__(self, by: Noting) -> None:
+        self._by = by
+
+    def step(self, row: NDArray[np.float32], seen: Seen) -> list[Answer]:
+        self._by.seen.append((row, seen))
+        return []
+
+    def finish(self) -> list[Answer]:
+        return []
+
+
+class _Continuing(_Following):
+    def continued(self, _: Route, came_from: Any) -> _Continuing:
+        return _Continuing(self._by)
+
+
+@pytest.mark.parametrize("continuing", [False, True])
+def test_what_verifies_is_split_as_the_row_is(continuing: bool) -> None:
+    """Of the items alone; where all are seen, those that were not compared are the least alike."""
+    rows, seen = drive(4)
+    seen = [*verified(seen[:3]), seen[3]]
+    items = np.array([3, 1990, 2001, 4999])
+    noting: Any = Noting(continuing)
+    matched(noting, rows, seen, [items, None, items + 0, items])
+    found = [one.verifying for _, one in noting.seen]
+    assert found[3] is None
+    for at in (0, 1, 2):
+        whole, verifying = seen[at].verifying, found[at]
+        assert whole is not None
+        assert verifying is not None
+        assert verifying.shape == noting.seen[at][0].shape
+        if at == 1:
+            np.testing.assert_array_equal(verifying, whole)
+            continue
+        np.testing.assert_array_equal(verifying if continuing else verifying[items], whole[items])
+        if not continuing:
+            assert (np.delete(verifying, items) == whole[items].min()).all()
+
+
 @pytest.mark.parametrize("lag_s", [0.0, 2.0])
-def test_all_items_are_a_part_that_changes_nothing(lag_s: float) -> None:
+def test_what_verifies_goes_along_where_the_part_changes(lag_s: float, by_what_verifies: None) -> None:
+    """Also that of images which wait for their answers."""
+    rows, seen = drive(40)
+    seen = verified(seen)
+    wanted = matched(Bayes(lag_s=lag_s), rows, seen, [None] * 40)
+    found = matched(Bayes(lag_s=lag_s), rows, seen, windows(40, 7))
+    same = [one.item == other.item for one, other in zip(found, wanted, strict=True)]
+    apart = np.array([one.score - other.score for one, other in zip(found, wanted, strict=True)])
+    assert np.mean(same[10:]) > 0.9
+    assert np.abs(apart[10:][same[10:]]).max() < 0.05
+    assert np.std([one.score for one in found]) > 0.01
+
+
+@pytest.mark.parametrize("lag_s", [0.0, 2.0])
+def test_all_items_are_a_part_that_changes_nothing(lag_s: float, by_what_verifies: None) -> None:
     rows, seen = drive(30)
+    seen = verified(seen)
     wanted = matched(Bayes(lag_s=lag_s), rows, seen, [None] * 30)
     found = matched(Bayes(lag_s=lag_s), rows, seen, [np.arange(ITEMS)] * 30)
     assert found == wanted

@@ -14,7 +14,7 @@ from evplace.core.tables import empty_rows, rows_of
 from evplace.imaging.traverse import Traverse
 from evplace.matchers import Answer, Path, RouteMatcher, Seen
 from evplace.matchers._checks import check_path
-from evplace.scorers import Rows
+from evplace.scorers import Rows, Verifies
 
 if TYPE_CHECKING:
     from evplace.localizer import Localizer
@@ -77,11 +77,7 @@ class Answering:
         block = 1 if self._live else BLOCK
         while self._done < len(self._filled):
             part = self._filled[self._done : self._done + block]
-            rows, seen = self._of._scored(*self._of._shown(self._query, part))
-            if self._given is not None:
-                rows = self._given[part]
-            elif self.rows is not None:
-                self.rows[part] = rows
+            rows, seen = self._next(part)
             self._take(rows, seen)
             self._done += len(part)
             yield part, rows
@@ -121,6 +117,18 @@ class Answering:
     @property
     def _reached(self) -> int:
         return int(self._filled[self._done - 1]) + 1 if self._done else 0
+
+    def _next(self, part: NDArray[np.int64]) -> tuple[Rows, list[Seen]]:
+        """The rows of the next images, and what is seen of them; no image is scored without need."""
+        images, seen = self._of._shown(self._query, part)
+        if self._given is None:
+            rows, seen = self._of._scored(images, seen)
+            if self.rows is not None:
+                self.rows[part] = rows
+            return rows, seen
+        if isinstance(self._of.matcher, RouteMatcher) and isinstance(self._of.scorer, Verifies):
+            seen = self._of._scored(images, seen)[1]
+        return self._given[part], seen
 
     def _take(self, rows: Rows, seen: list[Seen]) -> None:
         """Show the matcher the next images."""
