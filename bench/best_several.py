@@ -11,7 +11,6 @@ gained over day alone stands behind, with the range that nine of ten draws of st
 from __future__ import annotations
 
 import argparse
-import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -21,10 +20,7 @@ from numpy.typing import NDArray
 
 from best import truth_of
 from evplace import Localizer, PlaceGrid, PlaceMap, Traverse, train
-from evplace.imaging.averaging import Averager
 from evplace.placemap import add, named, parts_of
-from evplace.placemap._parts import JoinedRows
-from evplace.scorers import opened_together
 from evplace.scorers.fused import Fused
 
 LARGER = "day-1, all images"
@@ -63,45 +59,14 @@ def maps(drives: dict[str, Traverse], alone: dict[str, PlaceMap]) -> Iterator[tu
         yield f"all but {others[-1]}", add(day, *(drives[name] for name in others[:-1]), names=others[:-1])
 
 
-class Scored:
-    """The rows of queries on the whole map of each drive, made once: each image is described once."""
-
-    def __init__(self, alone: dict[str, PlaceMap]) -> None:
-        self._alone = alone
-        whole = [dataclasses.replace(one.parts[0].map, parts=()) for one in alone.values()]
-        self._scoring = opened_together(whole[0].scorer, [one.content for one in whole])
-        self._rows: dict[str, dict[str, NDArray[np.float32]]] = {}
-
-    def rows(self, place_map: PlaceMap, query: Traverse, name: str) -> NDArray[np.float32]:
-        """(queries, items) of a map of some of these drives."""
-        if name not in self._rows:
-            self._rows[name] = self._scored(query)
-        kept = [
-            self._rows[name][part.name][:, np.isin(self._alone[part.name].items.t_us, part.map.items.t_us)]
-            for part in parts_of(place_map)
-        ]
-        joined = place_map.scoring()
-        assert isinstance(joined, JoinedRows)
-        return joined.best(np.concatenate(kept, axis=1))
-
-    def _scored(self, query: Traverse) -> dict[str, NDArray[np.float32]]:
-        """(queries, references) on the map of each drive."""
-        averager = Averager(Fused().averaging)
-        found: list[list[NDArray[np.float32]]] = [[] for _ in self._scoring]
-        for image, t_us in zip(query.images, query.t_us, strict=True):
-            mean = averager.push(np.asarray(image), int(t_us))[None]
-            for rows, one in zip(found, self._scoring, strict=True):
-                rows.append(one.rows(mean)[0])
-        return {name: np.stack(rows) for name, rows in zip(self._alone, found, strict=True)}
-
-
-def judged(place_map: PlaceMap, query: Traverse, rows: NDArray[np.float32]) -> Judged:
+def judged(place_map: PlaceMap, query: Traverse) -> Judged:
     """Its answers, live."""
-    found = Localizer(place_map).answers(query, "live", rows).path
+    answered = Localizer(place_map).answers(query, "live")
+    found = answered.path
     truth = truth_of(place_map, query)
     known = truth.seen
     right = np.where(known, found.accepted & truth.accepts(found.item), ~found.accepted)
-    best = truth.accepts(rows.argmax(axis=1))
+    best = truth.accepts(answered.rows.argmax(axis=1))
     return Judged(right, found.accepted, known, 100 * float(best[known].mean()))
 
 
@@ -134,13 +99,13 @@ def main() -> None:
         known = {name: drives[name] for name in ["day-1", *args.drives] if name in drives}
         alone = {name: map_of(drive, name) for name, drive in known.items()}
         alone[LARGER] = map_of(drives["day-1"], LARGER, every_m=0.4)
-        scored, first = Scored(alone), dict[str, Judged]()
+        first = dict[str, Judged]()
         for title, place_map in maps(known, alone):
             inside = {part.name for part in parts_of(place_map)}
             references = sum(len(part.item) for part in parts_of(place_map))
             for name in (name for name in args.queries if name in drives and name not in inside):
                 query = drives[name]
-                now = judged(place_map, query, scored.rows(place_map, query, name))
+                now = judged(place_map, query)
                 before = first.setdefault(name, now)
                 unknown = ~now.known
                 false = f"{100 * now.accepted[unknown].mean():5.1f}" if unknown.any() else "    -"
