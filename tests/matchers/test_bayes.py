@@ -17,7 +17,18 @@ from evplace.matchers import _route_filter as loops
 from evplace.matchers import _surroundings as around
 from evplace.matchers import _traces as traces
 from evplace.matchers._calibration import LATE, LIVE, SLOW, UNKNOWN, strangers
-from evplace.matchers._known import LATE_SIGNS, LONGER, SIGNS, SPANS, Judges, Means, Trees, joined, of_live
+from evplace.matchers._known import (
+    ASKED,
+    LATE_SIGNS,
+    LONGER,
+    SIGNS,
+    SPANS,
+    Judges,
+    Means,
+    Trees,
+    joined,
+    of_live,
+)
 from evplace.matchers._ways import Ways
 from evplace.matchers.bayes import Bayes
 from evplace.testing import check_matcher
@@ -339,16 +350,19 @@ def test_more_false_accepts_are_allowed_more_answers_are_accepted() -> None:
 
 def test_with_what_comes_later_the_worse_side_counts_whichever_it_is() -> None:
     rng = np.random.default_rng(0)
+    seen, to_come = np.array([7.0]), np.array([3.0])
     before, ahead = rng.normal(size=LATE_SIGNS * len(SPANS)), rng.normal(size=len(LONGER))
-    features = joined(before, ahead)
+    features = joined(np.append(before, seen), np.append(ahead, to_come))
     past, alone = before[LONGER], np.arange(LATE_SIGNS) * len(SPANS)
     np.testing.assert_array_equal(features[LONGER], np.minimum(past, ahead))
-    np.testing.assert_array_equal(features[len(before) :], np.maximum(past, ahead))
+    np.testing.assert_array_equal(features[len(before) : -2], np.maximum(past, ahead))
     np.testing.assert_array_equal(features[alone], before[alone])
+    np.testing.assert_array_equal(features[-2:], [7.0, 3.0])
     other = before.copy()
     other[LONGER] = ahead
-    np.testing.assert_array_equal(joined(other, past), features)
-    np.testing.assert_array_equal(joined(before, np.full(len(LONGER), np.nan))[len(before) :], past)
+    np.testing.assert_array_equal(joined(np.append(other, seen), np.append(past, to_come)), features)
+    nothing = joined(np.append(before, seen), np.full(len(LONGER) + 1, np.nan))
+    np.testing.assert_array_equal(nothing[len(before) :], [*past, 7.0, 0.0])
 
 
 def test_what_was_learned_must_be_what_is_learned() -> None:
@@ -372,10 +386,11 @@ def constant(quick: float, slow: float, features: int) -> Judges:
     """Whatever an answer looks like, it is right with one probability or the other."""
     start, intercept = np.log(quick / (1 - quick)), np.log(slow / (1 - slow))
     nothing = np.zeros((1, 1), np.int64), np.zeros((1, 1)), np.zeros((1, 2))
-    return Judges(Trees(float(start), *nothing), intercept * np.eye(1 + features)[0])
+    usual = np.zeros((2, len(ASKED)))  # half, so that a limit is between that and the map's own
+    return Judges(Trees(float(start), *nothing), intercept * np.eye(1 + features)[0], usual)
 
 
-MANY = (SIGNS * len(SPANS), LATE_SIGNS * len(SPANS) + len(LONGER) + SIGNS * len(SPANS))
+MANY = (SIGNS * len(SPANS) + 1, LATE_SIGNS * len(SPANS) + len(LONGER) + 2 + SIGNS * len(SPANS) + 1)
 """Features of a live answer, and of a late one."""
 SAID = {"live": (0.4, 0.6), "late": (0.3, 0.7)}
 """Of quick images and of slow ones."""

@@ -33,8 +33,8 @@ from evplace.matchers._known import (
 )
 
 Floats = NDArray[np.float64]
-LIVE_FEATURES = SIGNS * len(SPANS)
-LATE_FEATURES = LATE_SIGNS * len(SPANS) + len(LONGER) + LIVE_FEATURES
+LIVE_FEATURES = SIGNS * len(SPANS) + 1
+LATE_FEATURES = LATE_SIGNS * len(SPANS) + len(LONGER) + 2 + LIVE_FEATURES
 
 
 def made_trees(rng: np.random.Generator, features: int, trees: int = 3, depth: int = 2) -> Trees:
@@ -85,7 +85,7 @@ def test_running_means_are_those_of_a_whole_drive(images: int, signs: int, seed:
     running = Means(signs)
     each = np.array([running.add(one, weight) for one, weight in zip(values, weights, strict=True)])
     whole = means_of(values, weights, SPANS)
-    assert whole.shape == (images, signs * len(SPANS))
+    assert whole.shape == (images, signs * len(SPANS) + 1)
     np.testing.assert_allclose(each, whole, rtol=1e-9, atol=1e-12)
 
 
@@ -96,10 +96,12 @@ def test_a_mean_is_over_its_span() -> None:
     back = np.arange(12)[::-1]
     shares = np.exp(-back[:, None] / SPANS)
     wanted = (values[:, :, None] * shares[:, None]).sum(axis=0) / shares.sum(axis=0)
-    found = means_of(values, weights, SPANS)[-1].reshape(2, len(SPANS))
+    *means, seen = means_of(values, weights, SPANS)[-1]
+    found = np.reshape(means, (2, len(SPANS)))
+    assert seen == pytest.approx(shares[:, -1].sum(), rel=1e-6)
     np.testing.assert_allclose(found, wanted, rtol=1e-6)
     np.testing.assert_allclose(found[:, 0], values[-1])  # the shortest span: the image alone
-    ahead = means_ahead(values, weights)[0].reshape(2, len(SPANS) - 1)
+    ahead = means_ahead(values, weights)[0, :-1].reshape(2, len(SPANS) - 1)
     shares = shares[::-1, 1:]
     np.testing.assert_allclose(
         ahead, (values[:, :, None] * shares[:, None]).sum(axis=0) / shares.sum(axis=0), rtol=1e-6

@@ -12,7 +12,7 @@ from evplace.core import families
 from evplace.core.zscores import robust_z
 from evplace.matchers import Answer, Matcher, Route, Seen
 from evplace.matchers._answering import RISE, Reader
-from evplace.matchers._known import LATE_SIGNS, LONGER, SIGNS, SPANS, Judges, Trees
+from evplace.matchers._known import ASKED, LATE_SIGNS, LONGER, SIGNS, SPANS, Judges, Trees
 from evplace.matchers._parts import InParts
 from evplace.matchers._ways import Ways
 from evplace.matchers.bayes import Bayes
@@ -71,10 +71,10 @@ def by_what_verifies(monkeypatch: pytest.MonkeyPatch) -> None:
     """Answers are judged by what verifies them alone: the mean of the last images' sign."""
     last = VERIFIES * len(SPANS) + 1
     nothing = Trees(0.0, np.zeros((1, 1), np.int64), np.zeros((1, 1)), np.zeros((1, 2)))
-    live, late = np.zeros(1 + SIGNS * len(SPANS)), np.zeros(1 + LATE_SIGNS * len(SPANS) + len(LONGER))
+    many = SIGNS * len(SPANS) + 1
+    live, late = np.zeros(1 + many), np.zeros(1 + LATE_SIGNS * len(SPANS) + len(LONGER) + 2 + many)
     live[1 + last] = late[1 + last] = 1.0
-    late = np.concatenate([late, np.zeros(SIGNS * len(SPANS))])
-    both = Judges(nothing, live), Judges(nothing, late)
+    both = [Judges(nothing, one, np.zeros((2, len(ASKED)))) for one in (live, late)]
     monkeypatch.setattr("evplace.matchers._known.judges", lambda: both)
     monkeypatch.setattr("evplace.matchers._belief.FAR_APART_S", 0.0)
 

@@ -101,19 +101,22 @@ class Means:
         self._weights = np.zeros(len(SPANS))
 
     def add(self, signs: Floats, weight: float) -> Floats:
-        """(signs * SPANS,) the means with one more image; one that says nothing changes nothing."""
+        """(signs * SPANS + 1,) the means with one more image, and how much was seen, up to the longest span.
+
+        An image that says nothing changes nothing.
+        """
         weight = min(weight, 1.0)
         keep = np.exp(-weight / SPANS)
         self._sums = self._sums * keep + signs[:, None] * weight
         self._weights = self._weights * keep + weight + 1e-9
-        return np.asarray((self._sums / self._weights).reshape(-1), np.float64)
+        return np.append((self._sums / self._weights).reshape(-1), self._weights[-1])
 
 
 @njit(cache=True, nogil=True)
 def means_of(signs: Floats, weights: Floats, spans: Floats) -> Floats:
-    """(n, signs * spans) the running means of a drive (n, signs), each up to its image."""
+    """(n, signs * spans + 1) as `Means` of a drive (n, signs), each up to its image."""
     n, many = signs.shape
-    out = np.empty((n, many * len(spans)))
+    out = np.empty((n, many * len(spans) + 1))
     sums, total = np.zeros((many, len(spans))), np.zeros(len(spans))
     for i in range(n):
         weight = min(weights[i], 1.0)
@@ -123,6 +126,7 @@ def means_of(signs: Floats, weights: Floats, spans: Floats) -> Floats:
             for k in range(many):
                 sums[k, s] = sums[k, s] * keep + signs[i, k] * weight
                 out[i, k * len(spans) + s] = sums[k, s] / total[s]
+        out[i, -1] = total[-1]
     return out
 
 
@@ -153,13 +157,13 @@ def joined(before: Floats, ahead: Floats) -> Floats:
     """(..., features) the means before and ahead; where these are not known, those before stand for them.
 
     Of the two sides the worse comes first, whichever it is: an answer is right where both look right, and it
-    is all the same on which side a drive enters the map or leaves it.
+    is all the same on which side a drive enters the map or leaves it. How much was seen on each comes last.
     """
-    past = before[..., LONGER]
-    ahead = np.where(np.isnan(ahead), past, ahead)
-    sides = [before.copy(), np.maximum(past, ahead)]
-    sides[0][..., LONGER] = np.minimum(past, ahead)
-    return np.concatenate(sides, axis=-1)
+    past, seen, to_come = before[..., LONGER], before[..., -1:], ahead[..., -1:]
+    ahead = np.where(np.isnan(ahead[..., :-1]), past, ahead[..., :-1])
+    least = before[..., :-1].copy()
+    least[..., LONGER] = np.minimum(past, ahead)
+    return np.concatenate([least, np.maximum(past, ahead), seen, np.nan_to_num(to_come)], axis=-1)
 
 
 def of_live(signs: Floats, weights: Floats) -> Floats:

@@ -26,7 +26,7 @@ from evplace.core.storage import write_json
 from evplace.core.workers import Workers
 from evplace.imaging.traverse import Traverse
 from evplace.localizer import Localizer
-from evplace.matchers import Seen
+from evplace.matchers import Learned, Seen
 from evplace.matchers import _traces as traces
 from evplace.matchers._calibration import strangers
 from evplace.matchers._known import ASKED, Judges, limit, of_late, of_live, said
@@ -66,6 +66,8 @@ CUT_M = (60.0, 150.0)
 """Shortest and longest stretch that a map lacks, or has."""
 CUTS = 2
 """Maps with stretches cut out, for each drive."""
+BEGINS_ANEW = 250
+"""Images, at ten a second, after which a drive begins anew on such a map: beginnings are learned, too."""
 ASKED_FOR = 0.01
 """Share of false accepts for which the thresholds are."""
 RIDGE = 1e-3
@@ -245,7 +247,8 @@ def _drives(
         whole = np.ones(len(place_map.items), np.bool_)
         for number in range(1 + CUTS):
             keep = _cut(Ways.of(place_map.route()), rng) if number else whole
-            yield Drive(camera, query, number == 0, _answers(place_map, traverse, rows, seen, keep))
+            pieces = max(len(seen) * every // BEGINS_ANEW, 1) if number else 1
+            yield Drive(camera, query, number == 0, _answers(place_map, traverse, rows, seen, keep, pieces))
 
 
 def _cut(ways: Ways, rng: np.random.Generator) -> Bools:
@@ -258,9 +261,14 @@ def _cut(ways: Ways, rng: np.random.Generator) -> Bools:
 
 
 def _answers(
-    place_map: PlaceMap, query: Traverse, rows: NDArray[np.float32], seen: list[Seen], keep: Bools
+    place_map: PlaceMap,
+    query: Traverse,
+    rows: NDArray[np.float32],
+    seen: list[Seen],
+    keep: Bools,
+    pieces: int,
 ) -> Answers:
-    """What the filter says of a drive on the items that are left."""
+    """What the filter says of a drive on the items that are left, each of its pieces begun anew."""
     route = place_map.route()
     assert route.t_us is not None
     part = route._replace(
@@ -269,19 +277,29 @@ def _answers(
     ways, learned = Ways.of(part), route.learned or {}
     seen = [one._replace(verifying=None if one.verifying is None else one.verifying[keep]) for one in seen]
     right = _right(query, part.position, part.heading_deg)
-    found = {
-        "live": traces.live(ways, rows[:, keep], seen, learned),
-        "late": traces.late(ways, rows[:, keep], seen, learned),
-    }
     known = np.asarray(right.any(axis=1), np.bool_)
+    each = [
+        _piece(ways, rows[at][:, keep], [seen[one] for one in at], right[at], known[at], learned)
+        for at in np.array_split(np.arange(len(rows)), pieces)
+    ]
+    together = {
+        name: {kind: np.concatenate([getattr(one, name)[kind] for one in each]) for kind in KINDS}
+        for name in ("features", "right")
+    }
+    return Answers(**together, known=known, slow=np.concatenate([one.slow for one in each]))
+
+
+def _piece(
+    ways: Ways, rows: NDArray[np.float32], seen: list[Seen], right: Bools, known: Bools, learned: Learned
+) -> Answers:
+    """The same of one piece, of whose images these items are right."""
+    live, late = traces.live(ways, rows, seen, learned), traces.late(ways, rows, seen, learned)
+    at = np.arange(len(right))
     return Answers(
-        {
-            "live": of_live(found["live"].signs, found["live"].weight),
-            "late": of_late(found["late"].signs, found["late"].live, found["late"].weight),
-        },
-        {kind: right[np.arange(len(right)), one.item] for kind, one in found.items()},
+        {"live": of_live(live.signs, live.weight), "late": of_late(late.signs, late.live, late.weight)},
+        {"live": right[at, live.item], "late": right[at, late.item]},
         known,
-        found["live"].slow,
+        live.slow,
     )
 
 
