@@ -533,7 +533,7 @@ def test_images_that_wait_keep_what_verifies_them(lag_s: float, by_what_verifies
     """On the same items in the same order, nothing changes; of others, each has its own."""
     route = road(100)
     rows, seen = rows_along(route, 20 + np.arange(30) / 2), at_rate(30, 10)
-    verifying = np.random.default_rng(2).normal(2.0, 2.0, (30, 100)).astype(np.float32)
+    verifying = np.random.default_rng(2).normal(0.0, 2.0, (30, 100)).astype(np.float32)
     seen = [one._replace(verifying=row) for one, row in zip(seen, verifying, strict=True)]
     wanted = drive(Bayes(lag_s=lag_s), route, rows, seen)
     following, found = Bayes(lag_s=lag_s).follow(route), list[Answer]()
@@ -572,8 +572,9 @@ def test_a_map_is_measured_by_what_verifies_its_own_images(cut_twice: None) -> N
         found = strangers(route._replace(verifying=verifying), lambda part: own[part])
         assert found is not None
         for features in (found.live, found.late):
-            wanted = features[:, 0] if told is None else np.full(len(features), told)
-            np.testing.assert_allclose(features[:, VERIFIES], wanted, rtol=1e-6)
+            means = slice(VERIFIES, VERIFIES + len(SPANS))
+            wanted = features[:, : len(SPANS)] if told is None else np.full((len(features), len(SPANS)), told)
+            np.testing.assert_allclose(features[:, means], wanted, rtol=1e-6)
 
 
 def test_of_several_drives_each_has_what_verifies_it(monkeypatch: pytest.MonkeyPatch) -> None:
