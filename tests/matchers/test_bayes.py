@@ -400,7 +400,8 @@ WAYS = ["live", "lag", "hindsight"]
 @pytest.fixture
 def constants(monkeypatch: pytest.MonkeyPatch) -> None:
     both = tuple(constant(*said, many) for said, many in zip(SAID.values(), MANY, strict=True))
-    monkeypatch.setattr(_known, "judges", lambda: both)
+    for module in (_known, _calibration):
+        monkeypatch.setattr(module, "judges", lambda: both)
 
 
 def measured_as(**values: float) -> Learned:
@@ -441,6 +442,7 @@ def test_images_of_a_slow_camera_have_their_own_judge_and_threshold(
     right, accepted = judged(way, route._replace(learned=learned), rows, seen)
     wanted = np.where(IS_SLOW, *SAID["live" if way == "live" else "late"][::-1])
     np.testing.assert_allclose(right, wanted)
+    quick, slow = (1 / (1 + np.sqrt(1 / own - 1)) for own in (quick, slow))  # halfway to one half
     assert accepted == (wanted > np.where(IS_SLOW, slow, quick)).tolist()
 
 
@@ -494,7 +496,7 @@ def test_a_map_that_an_earlier_version_measured_is_to_be_calibrated(way: str, cu
 def verifying_alone(features: int) -> Judges:
     """What verifies the image above 2: right; else wrong. The same of slow cameras, less sharply."""
     trees = Trees(0.0, np.array([[VERIFIES]]), np.array([[2.0]]), np.array([[-3.0, 3.0]]))
-    return Judges(trees, np.eye(1 + features)[1 + VERIFIES])
+    return Judges(trees, np.eye(1 + features)[1 + VERIFIES], np.zeros((2, len(ASKED))))
 
 
 VERIFIES = 3 * len(SPANS)
@@ -504,7 +506,8 @@ VERIFIES = 3 * len(SPANS)
 @pytest.fixture
 def by_what_verifies(monkeypatch: pytest.MonkeyPatch) -> None:
     both = tuple(verifying_alone(many) for many in MANY)
-    monkeypatch.setattr(_known, "judges", lambda: both)
+    for module in (_known, _calibration):
+        monkeypatch.setattr(module, "judges", lambda: both)
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -38,13 +38,9 @@ class Scale(NamedTuple):
 class _Asked(NamedTuple):
     """What an index is asked of an image."""
 
-    query: Vectors
-    """(1, dimensions)."""
-    shift: float
-    """What is taken off its scores, so that they are z-scores."""
-    verifying: Vectors
-    """(1, dimensions) for the first descriptor alone."""
-    verifying_shift: float
+    pairs: tuple[tuple[Vectors, float], tuple[Vectors, float]]
+    """(1, dimensions) for all descriptors, and what is taken off their scores to make z-scores; then the same
+    for the first alone."""
     usual: tuple[Vectors, Vectors]
     """z-scores of the references that tell what is usual, by all descriptors and by the first."""
 
@@ -113,22 +109,22 @@ class IndexedRows:
 
     def _some(self, asked: _Asked, items: NDArray[np.int64]) -> tuple[Vectors, Vectors]:
         """(len(items),) of all descriptors, and of the first."""
-        pairs = [(asked.query, asked.shift), (asked.verifying, asked.verifying_shift)]
-        row, verifying = (self._search.scores(query, items)[0] - np.float32(shift) for query, shift in pairs)
+        row, verifying = (
+            self._search.scores(query, items)[0] - np.float32(shift) for query, shift in asked.pairs
+        )
         return row, verifying
 
     def _row(self, asked: _Asked) -> tuple[Vectors, Vectors]:
         """(items,) the same of all."""
         if self._search.compares_all:
-            pairs = [(asked.query, asked.shift), (asked.verifying, asked.verifying_shift)]
-            whole, alone = (self._search.rows(query)[0] - np.float32(shift) for query, shift in pairs)
+            whole, alone = (self._search.rows(query)[0] - np.float32(shift) for query, shift in asked.pairs)
             return whole, alone
         row, verifying = np.zeros(self._items, np.float32), np.zeros(self._items, np.float32)
         row[ordered(self._items)], verifying[ordered(self._items)] = asked.usual
-        found = self._search.top(asked.query, LISTED)
-        items = np.sort(found.items[0])
-        row[found.items[0]] = found.scores[0] - np.float32(asked.shift)
-        verifying[items] = self._some(asked, items)[1]
+        (query, shift), (alone, alone_shift) = asked.pairs
+        (items,), (scores,) = self._search.top(query, LISTED)
+        row[items] = scores - np.float32(shift)
+        verifying[items] = self._search.scores(alone, items)[0] - np.float32(alone_shift)
         return row, verifying
 
     def _asked(self, image: NDArray[np.uint8]) -> _Asked:
@@ -148,10 +144,8 @@ class IndexedRows:
         alone = scale(scores[:1], self._weights[:1])
         verifying = [np.zeros_like(one) for one in beside]
         verifying[0] = np.float32(alone.factors[0] * self._spreads[0] / self._weights[0]) * described[0]
-        return _Asked(
-            np.concatenate(beside, axis=1), by.shift, np.concatenate(verifying, axis=1), alone.shift,
-            (np.asarray(usual - np.float32(by.shift), np.float32), robust_z(scores[0])),
-        )  # fmt: skip
+        pairs = (np.concatenate(beside, axis=1), by.shift), (np.concatenate(verifying, axis=1), alone.shift)
+        return _Asked(pairs, (np.asarray(usual - np.float32(by.shift), np.float32), robust_z(scores[0])))
 
 
 def _spread(vectors: Vectors, usual: Vectors) -> float:
