@@ -72,6 +72,8 @@ ASKED_FOR = 0.01
 """Share of false accepts for which the thresholds are."""
 RIDGE = 1e-3
 """Penalty on large weights."""
+HOW_MUCH_LIVE, HOW_MUCH_LATE = 1, 2
+"""So many of the last features say how much was seen: of live answers, and of both sides of late ones."""
 LIVE_COUNTS = 0.5
 """What the log-odds of a live answer count beside those of the late one."""
 NEAR_M, SAME_WAY_DEG = 20.0, 34.0
@@ -129,6 +131,15 @@ class Drive:
     query: str
     whole: bool
     answers: Answers
+    broken: bool = False
+    """Whether it begins anew every so often."""
+
+    @property
+    def counts(self) -> Bools:
+        """(queries,) what trees and rates are made of: on cut maps, broken drives of a quick camera, and
+        those of a slow one that go on, which has too few images to begin often.
+        """
+        return np.asarray(np.where(self.answers.slow, not self.broken, self.whole or self.broken), np.bool_)
 
 
 @dataclass(frozen=True)
@@ -247,8 +258,11 @@ def _drives(
         whole = np.ones(len(place_map.items), np.bool_)
         for number in range(1 + CUTS):
             keep = _cut(Ways.of(place_map.route()), rng) if number else whole
-            pieces = max(len(seen) * every // BEGINS_ANEW, 1) if number else 1
-            yield Drive(camera, query, number == 0, _answers(place_map, traverse, rows, seen, keep, pieces))
+            yield Drive(camera, query, number == 0, _answers(place_map, traverse, rows, seen, keep))
+            if number:
+                pieces = max(len(seen) * every // BEGINS_ANEW, 1)
+                answers = _answers(place_map, traverse, rows, seen, keep, pieces)
+                yield Drive(camera, query, False, answers, broken=True)
 
 
 def _cut(ways: Ways, rng: np.random.Generator) -> Bools:
@@ -266,7 +280,7 @@ def _answers(
     rows: NDArray[np.float32],
     seen: list[Seen],
     keep: Bools,
-    pieces: int,
+    pieces: int = 1,
 ) -> Answers:
     """What the filter says of a drive on the items that are left, each of its pieces begun anew."""
     route = place_map.route()
@@ -322,22 +336,21 @@ def _fitted(drives: list[Drive], kind: str) -> Judges:
     unknown: list[tuple[Floats, Bools]] = []
     for town in towns:
         judges = _judges([one for one in drives if one.camera.town != town] or drives, kind)
-        there = [one.answers for one in drives if one.camera.town == town]
-        unknown += [(_unknown(one, kind, judges), one.slow[~one.known]) for one in there]
+        unknown += [_unknown(one, kind, judges) for one in drives if one.camera.town == town]
     found, slow = (np.concatenate(column) for column in zip(*unknown, strict=True))
     usual = [_log_odds(np.quantile(found[slow == flag], 1 - ASKED)) for flag in (False, True)]
     return _judges(drives, kind)._replace(usual=np.array(usual))
 
 
 def _judges(drives: list[Drive], kind: str) -> Judges:
-    """Trees, by the answers of quick cameras; a regression, by all of events."""
-    quick = [~drive.answers.slow for drive in drives]
+    """Trees, by the answers of quick cameras; a regression, by all of events, of drives that go on."""
+    quick = [drive.counts & ~drive.answers.slow for drive in drives]
     right, features = (
         np.concatenate([of(drive.answers)[chosen] for drive, chosen in zip(drives, quick, strict=True)])
         for of in (_right_of(kind), _features_of(kind))
     )
-    of_events = [drive for drive in drives if drive.camera.sensor != COLOUR]
-    return Judges(boosted(features, right), _linear(of_events, kind), np.zeros((2, len(ASKED))))
+    going_on = [one for one in drives if one.camera.sensor != COLOUR and not one.broken]
+    return Judges(boosted(features, right), _linear(going_on, kind), np.zeros((2, len(ASKED))))
 
 
 def _log_odds(probability: Floats) -> Floats:
@@ -354,7 +367,7 @@ def _features_of(kind: str) -> Callable[[Answers], Floats]:
 
 
 def _linear(drives: list[Drive], kind: str) -> Floats:
-    """The weights of 1 and of the features.
+    """The weights of 1 and of the features; 0 of how much was seen, which is no matter of more or less.
 
     Of late answers those of both sides are fitted by themselves; then the log-odds of live ones are added by
     LIVE_COUNTS, and the sum scaled anew.
@@ -364,12 +377,17 @@ def _linear(drives: list[Drive], kind: str) -> Floats:
         for of in (_right_of(kind), _features_of(kind))
     )
     if kind == "live":
-        return _regression(features, right)
+        return _without(HOW_MUCH_LIVE, features, right)
     sides = len(features[0]) - len(drives[0].answers.features["live"][0])
-    own, live = _regression(features[:, :sides], right), _linear(drives, "live")
+    own, live = _without(HOW_MUCH_LATE, features[:, :sides], right), _linear(drives, "live")
     weights = np.concatenate([[own[0] + LIVE_COUNTS * live[0]], own[1:], LIVE_COUNTS * live[1:]])
     shift, scale = _regression((weights[0] + features @ weights[1:])[:, None], right)
     return np.asarray(scale * weights + shift * np.eye(len(weights))[0], np.float64)
+
+
+def _without(last: int, features: Floats, right: Floats) -> Floats:
+    """A regression on all but the last few features, whose weights are 0."""
+    return np.concatenate([_regression(features[:, :-last], right), np.zeros(last)])
 
 
 def _regression(features: Floats, right: Floats) -> Floats:
@@ -420,19 +438,15 @@ def _at(group: list[Drive], kind: str, judges: Judges, limits: Floats) -> dict[s
     (whole,) = (one.answers for one in group if one.whole)
     accepted = said(judges, whole.features[kind], whole.slow) > limits[whole.slow.astype(int)]
     good = np.where(whole.known, whole.right[kind] & accepted, ~accepted)
-    wrong = np.concatenate(
-        [
-            _unknown(one.answers, kind, judges) > limits[one.answers.slow[~one.answers.known].astype(int)]
-            for one in group
-        ]
-    )
+    unknown = [_unknown(one, kind, judges) for one in group]
+    wrong = np.concatenate([found > limits[slow.astype(int)] for found, slow in unknown])
     return {
         "accuracy": 100 * float(good.mean()),
         "false_accepts": 100 * float(wrong.mean()) if len(wrong) else None,
     }
 
 
-def _unknown(answers: Answers, kind: str, judges: Judges) -> Floats:
-    """The probabilities of the images of places that a drive's map lacks."""
-    there = ~answers.known
-    return said(judges, answers.features[kind][there], answers.slow[there])
+def _unknown(drive: Drive, kind: str, judges: Judges) -> tuple[Floats, Bools]:
+    """The probabilities of the images of places that a drive's map lacks, and which are of a slow camera."""
+    answers, there = drive.answers, ~drive.answers.known & drive.counts
+    return said(judges, answers.features[kind][there], answers.slow[there]), answers.slow[there]
