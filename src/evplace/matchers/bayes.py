@@ -2,9 +2,9 @@
 
 Two layers. The first says where the camera is, if it is on the map: a filter over the references, each with
 a class of speed (Markov localisation: Fox, Burgard and Thrun, JAIR 11, 1999). The second says whether that
-answer is right, from what the answers of the last second looked like (ours). What separates known from
-unknown is measured on the map alone: its own images are localised while stretches of the map are cut out;
-`false_accept` is the share of those never seen that may be accepted.
+answer is right, from what the answers of the last two seconds looked like (ours). What separates known from
+unknown is measured on the map: its own images are localised while stretches of the map are cut out;
+`false_accept` is the share of those never seen that may be accepted, halfway with what other towns need.
 
 Answers are live; with `lag_s` each is about the time so many seconds ago, and better; in hindsight all images
 count. Times are in seconds and ways in metres, so that images of any rate give the same answers.
@@ -63,7 +63,7 @@ class Bayes:
     """The settings; how the camera moves and what scores are worth is not set, but measured."""
 
     false_accept: float = 0.01
-    """Share of the images of places never seen that may be accepted, as measured on the map itself."""
+    """Share of the images of places never seen that may be accepted, as measured on the map and elsewhere."""
     threshold: float | None = None
     """Accept an answer whose probability is above this, whatever `false_accept` says. Default: by that."""
     lag_s: float = 0.0
